@@ -1,0 +1,20 @@
+"""Masks on the sphere: sums over windows and closing, seamless across +-180 degrees and over the poles."""
+
+import jax
+import jax.numpy as jnp
+
+from rein3d_jax.geometry.resample import pad_sphere
+
+
+def window_sum(image: jax.Array, radius: int) -> jax.Array:
+    """(h, w, ...) -> the sum over the (2 radius + 1)^2 pixels around each one."""
+    size = 2 * radius + 1
+    padded = pad_sphere(image, radius)
+    rows = sum(padded[i : i + image.shape[0]] for i in range(size))
+    return sum(rows[:, i : i + image.shape[1]] for i in range(size))
+
+
+def closing(mask: jax.Array, radius: int) -> jax.Array:
+    """(h, w) bool: `mask` and the gaps that no open square of side 2 radius + 1 fits into."""
+    dilated = window_sum(mask.astype(jnp.float32), radius) > 0
+    return mask | (window_sum((~dilated).astype(jnp.float32), radius) == 0)

@@ -1,0 +1,43 @@
+"""Rigid poses as 4x4 matrices, and the cameras that stand upright in the world."""
+
+import jax
+import jax.numpy as jnp
+
+from rein3d_jax.conventions import EQUIRECTANGULAR, PINHOLE
+from rein3d_jax.geometry.pinhole import focal_from_fov
+from rein3d_jax.scene import Camera
+
+
+def rigid(rotation: jax.Array, translation: jax.Array) -> jax.Array:
+    """(..., 3, 3), (..., 3) -> (..., 4, 4)."""
+    top = jnp.concatenate([rotation, translation[..., None]], axis=-1)
+    bottom = jnp.broadcast_to(jnp.array([0.0, 0.0, 0.0, 1.0], top.dtype), (*top.shape[:-2], 1, 4))
+    return jnp.concatenate([top, bottom], axis=-2)
+
+
+def invert(pose: jax.Array) -> jax.Array:
+    """b_from_a (..., 4, 4) -> a_from_b."""
+    rotation = jnp.swapaxes(pose[..., :3, :3], -1, -2)
+    moved = jnp.einsum("...ij,...j->...i", rotation, pose[..., :3, 3], precision=jax.lax.Precision.HIGHEST)
+    return rigid(rotation, -moved)
+
+
+def upright(position: jax.Array, yaw: jax.Array = 0.0, pitch: jax.Array = 0.0) -> jax.Array:
+    """world_from_camera (4, 4) of an OpenCV camera at `position` (3,) that looks along +X when yaw and
+    pitch are 0; yaw turns left, pitch looks up (radians)."""
+    yaw, pitch = jnp.asarray(yaw, jnp.float32), jnp.asarray(pitch, jnp.float32)
+    forward = jnp.stack([jnp.cos(yaw) * jnp.cos(pitch), jnp.sin(yaw) * jnp.cos(pitch), jnp.sin(pitch)])
+    right = jnp.stack([jnp.sin(yaw), -jnp.cos(yaw), jnp.zeros_like(yaw)])
+    down = jnp.cross(forward, right)
+    return rigid(jnp.stack([right, down, forward], axis=-1), jnp.asarray(position, jnp.float32))
+
+
+def equirectangular_camera(world_from_camera: jax.Array, height: int) -> Camera:
+    """A full-sphere camera of `height` x 2 `height` pixels."""
+    return Camera(world_from_camera, jnp.ones(2), jnp.zeros(2), EQUIRECTANGULAR, 2 * height, height)
+
+
+def pinhole_camera(world_from_camera: jax.Array, size: int, fov: float) -> Camera:
+    """A square pinhole camera of `size` pixels with its axis in the middle; `fov` in radians."""
+    focal = jnp.full(2, focal_from_fov(fov, size), jnp.float32)
+    return Camera(world_from_camera, focal, jnp.full(2, size / 2, jnp.float32), PINHOLE, size, size)

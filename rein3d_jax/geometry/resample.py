@@ -1,0 +1,41 @@
+"""Bilinear sampling of equirectangular images, seamless across +-180 degrees and over the poles."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+
+from rein3d_jax.geometry.pinhole import pixel_rays
+from rein3d_jax.geometry.sphere import pixels_from_rays
+from rein3d_jax.scene import Camera
+
+
+def pad_sphere(image: jax.Array, pad: int) -> jax.Array:
+    """(h, w, ...) -> (h + 2 pad, w + 2 pad, ...): wraps columns; a row beyond a pole is the row this side
+    of it, turned by half a revolution."""
+    over_pole = jnp.roll(image, image.shape[1] // 2, axis=1)
+    tall = jnp.concatenate([over_pole[:pad][::-1], image, over_pole[image.shape[0] - pad :][::-1]], axis=0)
+    return jnp.concatenate([tall[:, tall.shape[1] - pad :], tall, tall[:, :pad]], axis=1)
+
+
+def sample_sphere(image: jax.Array, u: jax.Array, v: jax.Array) -> jax.Array:
+    """Bilinear values of `image` (h, w, ...) at continuous pixels u, v (...), u in [0, w], v in [0, h]."""
+    padded = pad_sphere(image, 1)
+    x, y = u + 0.5, v + 0.5  # index of the pixel centre, one pixel of padding added
+    x0 = jnp.clip(jnp.floor(x).astype(jnp.int32), 0, padded.shape[1] - 2)
+    y0 = jnp.clip(jnp.floor(y).astype(jnp.int32), 0, padded.shape[0] - 2)
+    extra = (None,) * (image.ndim - 2)
+    fx, fy = (x - x0)[(..., *extra)], (y - y0)[(..., *extra)]
+    top = padded[y0, x0] * (1 - fx) + padded[y0, x0 + 1] * fx
+    bottom = padded[y0 + 1, x0] * (1 - fx) + padded[y0 + 1, x0 + 1] * fx
+    return top * (1 - fy) + bottom * fy
+
+
+def perspective_crop(image: jax.Array, world_from_panorama: jax.Array, camera: Camera) -> jax.Array:
+    """What a pinhole `camera` that stands where the panorama was taken sees of `image` (h, w, ...)."""
+    exact = partial(jnp.matmul, precision=jax.lax.Precision.HIGHEST)  # an accelerator's default is 10 bits
+    rotation = exact(world_from_panorama[:3, :3].T, camera.world_from_camera[:3, :3])
+    rays = exact(pixel_rays(camera.height, camera.width, camera.focal, camera.centre), rotation.T)
+    # pixels_from_rays speaks of an unturned panorama's world axes: +X is camera +z, +Y is -x, +Z is -y.
+    rays = jnp.stack([rays[..., 2], -rays[..., 0], -rays[..., 1]], axis=-1)
+    return sample_sphere(image, *pixels_from_rays(rays, image.shape[0], image.shape[1]))

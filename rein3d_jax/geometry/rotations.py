@@ -1,0 +1,47 @@
+"""Rotations: quaternions (wxyz) and matrices that act on column vectors."""
+
+import jax
+import jax.numpy as jnp
+
+from rein3d_jax.geometry.safe import safe_norm
+
+
+def normalize_quats(quats: jax.Array) -> jax.Array:
+    """(..., 4) -> (..., 4) unit; the zero quaternion, which names no rotation, becomes the identity."""
+    assert quats.shape[-1] == 4, quats.shape
+    norm = safe_norm(quats, keepdims=True)
+    identity = jnp.array([1.0, 0.0, 0.0, 0.0], quats.dtype)
+    return jnp.where(norm > 0, quats / jnp.where(norm > 0, norm, 1.0), identity)
+
+
+def matrix_from_quats(quats: jax.Array) -> jax.Array:
+    """(..., 4) wxyz of any length -> (..., 3, 3)."""
+    w, x, y, z = jnp.moveaxis(normalize_quats(quats), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return jnp.stack([jnp.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def multiply_quats(left: jax.Array, right: jax.Array) -> jax.Array:
+    """Hamilton product: (..., 4), (..., 4) -> (..., 4); rotates by `right` first."""
+    lw, lx, ly, lz = jnp.moveaxis(left, -1, 0)
+    rw, rx, ry, rz = jnp.moveaxis(right, -1, 0)
+    return jnp.stack(
+        [
+            lw * rw - lx * rx - ly * ry - lz * rz,
+            lw * rx + lx * rw + ly * rz - lz * ry,
+            lw * ry - lx * rz + ly * rw + lz * rx,
+            lw * rz + lx * ry - ly * rx + lz * rw,
+        ],
+        axis=-1,
+    )
+
+
+def yaw_quat(angle: jax.Array) -> jax.Array:
+    """Turn LEFT by `angle` radians about +Z (right-handed): () -> (4,)."""
+    angle = jnp.asarray(angle, jnp.float32)
+    zero = jnp.zeros_like(angle)
+    return jnp.stack([jnp.cos(angle / 2), zero, zero, jnp.sin(angle / 2)], axis=-1)

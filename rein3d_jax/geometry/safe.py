@@ -1,0 +1,17 @@
+"""Functions whose value AND gradient stay finite at their singular point."""
+
+import jax
+import jax.numpy as jnp
+
+
+def safe_norm(x: jax.Array, *, axis: int = -1, keepdims: bool = False) -> jax.Array:
+    """Euclidean norm with gradient 0 (not NaN) at x = 0."""
+    squared = jnp.sum(x * x, axis=axis, keepdims=keepdims)
+    positive = squared > 0
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1.0)), 0.0)
+
+
+def safe_divide(numerator: jax.Array, denominator: jax.Array, *, otherwise: float = 0.0) -> jax.Array:
+    """numerator / denominator, and `otherwise` with gradient 0 where the denominator is 0."""
+    zero = denominator == 0
+    return jnp.where(zero, otherwise, numerator / jnp.where(zero, 1.0, denominator))

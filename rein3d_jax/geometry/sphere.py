@@ -1,0 +1,54 @@
+"""Equirectangular maps. `u` runs right, `v` down, both continuous with the first pixel's centre at 0.5;
+a `ray` is a unit vector in the world frame (or, for `*_camera_*`, in OpenCV camera axes)."""
+
+import jax
+import jax.numpy as jnp
+
+
+def azimuths(width: int) -> jax.Array:
+    """(width,) radians of the column centres, turning right from +X."""
+    return ((jnp.arange(width) + 0.5) / width - 0.5) * 2 * jnp.pi
+
+
+def latitudes(height: int) -> jax.Array:
+    """(height,) radians of the row centres, pi/2 at the top."""
+    return (0.5 - (jnp.arange(height) + 0.5) / height) * jnp.pi
+
+
+def horizontal_direction(azimuth: jax.Array) -> jax.Array:
+    """(...) -> (..., 3): the paper's v = (cos phi, -sin phi, 0), Algorithm 1 line 16."""
+    return jnp.stack([jnp.cos(azimuth), -jnp.sin(azimuth), jnp.zeros_like(azimuth)], axis=-1)
+
+
+def pixel_rays(height: int, width: int) -> jax.Array:
+    """(height, width, 3) unit rays through the pixel centres."""
+    latitude = latitudes(height)[:, None, None]
+    flat = horizontal_direction(azimuths(width))[None]
+    up = jnp.array([0.0, 0.0, 1.0])
+    return jnp.cos(latitude) * flat + jnp.sin(latitude) * up
+
+
+def pixels_from_rays(rays: jax.Array, height: int, width: int) -> tuple[jax.Array, jax.Array]:
+    """World directions (..., 3) of any length -> (u, v) in pixels, u in [0, width]."""
+    azimuth = jnp.arctan2(-rays[..., 1], rays[..., 0])
+    latitude = jnp.arctan2(rays[..., 2], jnp.hypot(rays[..., 0], rays[..., 1]))
+    return (azimuth / (2 * jnp.pi) + 0.5) * width, (0.5 - latitude / jnp.pi) * height
+
+
+def world_from_camera_axes() -> jax.Array:
+    """(3, 3): the world rotation of an equirectangular camera that has not been turned; OpenCV +z is
+    world +X, +x is -Y, +y is -Z."""
+    return jnp.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+
+
+def rays_of_pose(world_from_camera: jax.Array, height: int, width: int) -> jax.Array:
+    """(height, width, 3) unit rays, in the world, of an equirectangular camera at `world_from_camera` (4, 4)."""
+    turn = jnp.matmul(world_from_camera[:3, :3], world_from_camera_axes().T, precision=jax.lax.Precision.HIGHEST)
+    return jnp.matmul(pixel_rays(height, width), turn.T, precision=jax.lax.Precision.HIGHEST)
+
+
+def pixel_solid_angles(height: int, width: int) -> jax.Array:
+    """(height, width) steradians of each pixel, exact; they sum to 4 pi."""
+    edges = (0.5 - jnp.arange(height + 1) / height) * jnp.pi
+    bands = jnp.sin(edges[:-1]) - jnp.sin(edges[1:])
+    return jnp.broadcast_to((bands * 2 * jnp.pi / width)[:, None], (height, width))

@@ -1,0 +1,10 @@
+"""Tests compile many tiny programs once: fast compilation counts, fast code does not.
+
+Value and gradient of the rasterizer: 13.5 s to compile as for use, 1.6 s with these flags. Set before jax starts; a
+user's own XLA_FLAGS come last and win.
+"""
+
+import os
+
+FAST_TO_COMPILE = "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false"
+os.environ["XLA_FLAGS"] = f"{FAST_TO_COMPILE} {os.environ.get('XLA_FLAGS', '')}".strip()
