@@ -1,0 +1,177 @@
+"""Gaussians -> splats: what one camera needs to evaluate and order them.
+
+Both cameras evaluate a splat at a pixel as alpha = exp(log_opacity - |axes (feature - mean)|^2 / 2), where
+
+- a pinhole pixel's feature is its position (u, v) and `axes` whitens the EWA covariance (Zwicker 2001);
+- an equirectangular pixel's feature is its unit ray in camera axes, and `axes` whitens the covariance on
+  the tangent plane at the Gaussian's own direction, with a third row along that direction that makes the
+  measure the chord between the two rays: it grows all the way to the antipode, where the tangent plane
+  alone would show a ghost. No longitude or latitude enters, so poles and seam are points like any other.
+"""
+
+import jax
+import jax.numpy as jnp
+from flax import struct
+
+from rein3d_jax.conventions import ALPHA_CUT, EQUIRECTANGULAR
+from rein3d_jax.geometry.covariance import scaled_axes
+from rein3d_jax.geometry.poses import invert
+from rein3d_jax.geometry.safe import safe_norm
+from rein3d_jax.geometry.spherical_harmonics import rgb_from_sh
+from rein3d_jax.rasterize.config import RasterizeConfig
+from rein3d_jax.scene import Camera, Gaussians
+
+# Beyond this angular size (radians, one sigma) a footprint is no longer an ellipse on the sphere; up to it,
+# alpha at the antipode, exp(-2 / 0.5^2) = 3e-4, lies under the 1/255 cut. A larger Gaussian is culled, as
+# one at the near plane is.
+MAX_ANGULAR_SIGMA = 0.5
+
+
+@struct.dataclass
+class Splats:
+    """n splats of one camera; k is 2 (pinhole) or 3 (equirectangular)."""
+
+    mean: jax.Array  # (n, k) in the camera's pixel features
+    axes: jax.Array  # (n, k, k) whitening rows
+    log_opacity: jax.Array  # (n,)
+    rgb: jax.Array  # (n, 3)
+    distance: jax.Array  # (n,) metres along the ray; also the order of compositing
+    visible: jax.Array  # (n,) bool
+    box: jax.Array  # (n, 4) left, top, right, bottom in pixels; equirectangular left may be negative
+
+
+def _whitening(cov_xx, cov_xy, cov_yy, det):
+    """U (n, 2, 2), upper triangular, with U^T U = covariance^-1."""
+    row_x = jnp.sqrt(cov_yy / det)
+    first = jnp.stack([row_x, -row_x * cov_xy / cov_yy], axis=-1)
+    second = jnp.stack([jnp.zeros_like(row_x), jax.lax.rsqrt(cov_yy)], axis=-1)
+    return jnp.stack([first, second], axis=-2)
+
+
+def _filtered(spread, variance, antialias):
+    """Footprint (n, 2, 3) -> filtered covariance (xx, xy, yy, determinant), opacity factor sqrt(det / det_filtered)."""
+    xx, xy, yy = (jnp.sum(spread[:, i] * spread[:, j], axis=-1) for i, j in ((0, 0), (0, 1), (1, 1)))
+    # xx yy - xy^2 would lose a needle to rounding, and the filter with it: the cross product does not.
+    normal = jnp.cross(spread[:, 0], spread[:, 1])
+    det = jnp.sum(normal * normal, axis=-1) + variance * (xx + yy) + variance**2
+    covariance = (xx + variance, xy, yy + variance, det)
+    if not antialias:
+        return covariance, 0.0
+    # A splat with no area has no opacity left; the floor keeps its logarithm finite.
+    return covariance, jnp.log(jnp.maximum(safe_norm(normal), 1e-12) * jax.lax.rsqrt(det))
+
+
+def _pinhole(points, spread, camera, config):
+    """Mean (n, 2), axes (n, 2, 2), log opacity factor, support extents per unit sigma (n, 2), in range."""
+    z = points[:, 2]
+    in_range = (z > config.near) & (z < config.far)
+    safe_z = jnp.where(in_range, z, 1.0)
+    x, y = points[:, 0] / safe_z, points[:, 1] / safe_z
+    mean = jnp.stack([x, y], axis=-1) * camera.focal + camera.centre
+    # Far off the frustum the affine approximation explodes: the slope is held at the edge + 0.3 tan (gsplat).
+    margin = 0.15 * jnp.array([camera.width, camera.height]) / camera.focal
+    low = -camera.centre / camera.focal - margin
+    high = (jnp.array([camera.width, camera.height]) - camera.centre) / camera.focal + margin
+    slope = jnp.clip(jnp.stack([x, y], axis=-1), low, high)
+    rows = (spread[:, :2] - slope[..., None] * spread[:, 2:]) * (camera.focal[:, None] / safe_z[:, None, None])
+    covariance, factor = _filtered(rows, config.filter_variance, config.antialias)
+    xx, _, yy, _ = covariance
+    return mean, _whitening(*covariance), factor, jnp.sqrt(jnp.stack([xx, yy], axis=-1)), in_range
+
+
+def _tangent_frame(direction):
+    """Two unit vectors (n, 2, 3) orthogonal to `direction` (n, 3); continuous except at one meridian sign
+    flip (Duff et al. 2017), where only their common rotation, which no result depends on, jumps."""
+    x, y, z = jnp.moveaxis(direction, -1, 0)
+    sign = jnp.where(z >= 0, 1.0, -1.0)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    first = jnp.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=-1)
+    return jnp.stack([first, jnp.stack([b, sign + y * y * a, -y], axis=-1)], axis=-2)
+
+
+def _equirectangular(points, spread, distance, camera, config):
+    """As `_pinhole`, with features in unit rays; the extents are one isotropic angle (n, 1)."""
+    in_range = (distance > config.near) & (distance < config.far)
+    safe_distance = jnp.where(in_range, distance, 1.0)
+    direction = jnp.where(in_range[:, None], points, jnp.array([0.0, 0.0, 1.0])) / safe_distance[:, None]
+    frame = _tangent_frame(direction)
+    rows = jnp.einsum("nij,njk->nik", frame, spread, precision="highest") / safe_distance[:, None, None]
+    # The filter is round on the sphere, with the pitch of a row: columns crowd at the poles, detail does not.
+    pixel = (jnp.pi / camera.height) ** 2
+    covariance, factor = _filtered(rows, config.filter_variance * pixel, config.antialias)
+    xx, xy, yy, _ = covariance
+    axes = jnp.einsum("nij,njk->nik", _whitening(*covariance), frame, precision="highest")
+    sigma = jnp.sqrt((xx + yy) / 2 + jnp.sqrt(((xx - yy) / 2) ** 2 + xy**2 + 1e-30))
+    axes = jnp.concatenate([axes, (direction / sigma[:, None])[:, None]], axis=1)
+    return direction, axes, factor, sigma[:, None], in_range & (sigma < MAX_ANGULAR_SIGMA)
+
+
+def _sphere_box(direction, angle, camera):
+    """Pixel box (n, 4) of the cap of `angle` radians around `direction`; the whole row where it holds a pole."""
+    azimuth = jnp.arctan2(direction[:, 0], direction[:, 2])
+    latitude = jnp.arcsin(jnp.clip(-direction[:, 1], -1.0, 1.0))
+    reach = jnp.sin(angle) / jnp.maximum(jnp.cos(latitude), 1e-12)  # sine of the cap's half width in azimuth
+    over_pole = jnp.abs(latitude) + angle >= jnp.pi / 2
+    half = jnp.where(over_pole, jnp.pi, jnp.arcsin(jnp.minimum(reach, 1.0)))
+    u, du = (azimuth / (2 * jnp.pi) + 0.5) * camera.width, half / (2 * jnp.pi) * camera.width
+    v, dv = (0.5 - latitude / jnp.pi) * camera.height, angle / jnp.pi * camera.height
+    return jnp.stack([u - du, v - dv, u + du, v + dv], axis=-1)
+
+
+def project(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig, probe: jax.Array | None = None) -> Splats:
+    """Gaussians in the world -> splats of `camera`.
+
+    Culled (visible = False): dead slots, non-finite parameters, centres out of [near, far], opacity under
+    the 1/255 cut, support off the image, and on the sphere sizes over MAX_ANGULAR_SIGMA.
+
+    `probe` (n, 2), zeros, is added to the whitened-plane position in pixels: its gradient is the 2D
+    positional gradient that densification reads (3DGS, Sec. 5.2).
+    """
+    count = gaussians.means.shape[0]
+    assert gaussians.means.shape == (count, 3), gaussians.means.shape
+    assert gaussians.quats.shape == (count, 4), gaussians.quats.shape
+    camera_from_world = invert(camera.world_from_camera)
+    rotation, translation = camera_from_world[:3, :3], camera_from_world[:3, 3]
+    usable = gaussians.alive & _finite(gaussians)
+    clean = jax.tree.map(lambda x: jnp.where(usable.reshape(-1, *[1] * (x.ndim - 1)), x, 0), gaussians)
+    points = jnp.einsum("ij,nj->ni", rotation, clean.means, precision="highest") + translation
+    distance = safe_norm(points)
+    # exp of a clipped log: a scale of 1e3 m squared still fits float32, and so does 1e-8 m.
+    spread = scaled_axes(jnp.clip(clean.log_scales, -18.5, 7.0), clean.quats)
+    spread = jnp.einsum("ij,njk->nik", rotation, spread, precision="highest")
+    if camera.model == EQUIRECTANGULAR:
+        mean, axes, factor, extent, in_range = _equirectangular(points, spread, distance, camera, config)
+    else:
+        mean, axes, factor, extent, in_range = _pinhole(points, spread, camera, config)
+    log_opacity = jax.nn.log_sigmoid(clean.opacity_logits) + factor
+    support = jnp.sqrt(2.0 * jnp.maximum(jax.lax.stop_gradient(log_opacity) - jnp.log(ALPHA_CUT), 0.0))
+    reach = support[:, None] * jax.lax.stop_gradient(extent)
+    if camera.model == EQUIRECTANGULAR:
+        angle = 2 * jnp.arcsin(jnp.minimum(reach[:, 0] / 2, 1.0))  # a chord is 2 sin(angle / 2)
+        box = _sphere_box(jax.lax.stop_gradient(mean), angle, camera)
+        on_image = jnp.ones(count, bool)
+    else:
+        low, high = mean - reach, mean + reach
+        box = jax.lax.stop_gradient(jnp.concatenate([low, high], axis=-1))
+        on_image = (box[:, 2] > 0) & (box[:, 3] > 0) & (box[:, 0] < camera.width) & (box[:, 1] < camera.height)
+    visible = usable & in_range & on_image & (log_opacity > jnp.log(ALPHA_CUT))
+    centre = camera.world_from_camera[:3, 3]
+    direction = (clean.means - centre) / jnp.maximum(distance, 1e-12)[:, None]
+    if probe is not None:
+        mean = mean + _probe_shift(probe, points, distance, camera)
+    return Splats(mean, axes, log_opacity, rgb_from_sh(clean.sh, direction), distance, visible, box)
+
+
+def _probe_shift(probe, points, distance, camera):
+    if camera.model != EQUIRECTANGULAR:
+        return probe
+    direction = jax.lax.stop_gradient(points / jnp.maximum(distance, 1e-12)[:, None])
+    return jnp.einsum("ni,nij->nj", probe, _tangent_frame(direction)) * (jnp.pi / camera.height)
+
+
+def _finite(gaussians: Gaussians) -> jax.Array:
+    """(n,) whether all parameters of a slot are finite."""
+    rows = [gaussians.means, gaussians.log_scales, gaussians.quats, gaussians.opacity_logits[:, None]]
+    flat = jnp.concatenate([*rows, gaussians.sh.reshape(gaussians.sh.shape[0], -1)], axis=-1)
+    return jnp.all(jnp.isfinite(flat), axis=-1)

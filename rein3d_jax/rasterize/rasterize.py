@@ -1,0 +1,121 @@
+"""The front door: Gaussians + camera -> Frame, differentiable in the Gaussians and in the camera's pose.
+
+    import jax.numpy as jnp
+    from rein3d_jax.geometry.poses import equirectangular_camera, upright
+    from rein3d_jax.rasterize import RasterizeConfig, allocate, rasterize
+    from rein3d_jax.scene import Gaussians
+
+    scene = Gaussians(jnp.array([[2.0, 0, 0]]), jnp.full((1, 3), -2.0), jnp.array([[1.0, 0, 0, 0]]),
+                      jnp.array([3.0]), jnp.ones((1, 1, 3)), jnp.array([True]))
+    camera = equirectangular_camera(upright(jnp.zeros(3)), height=64)
+    config = allocate(scene, [camera], config=RasterizeConfig())   # outside jit: measures the buffers
+    frame = rasterize(scene, camera, config=config)                # jit, grad, vmap over cameras
+    assert frame.rgb.shape == (64, 128, 3) and frame.overflow == 0
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+from flax import struct
+
+from rein3d_jax.conventions import EQUIRECTANGULAR
+from rein3d_jax.errors import InputError
+from rein3d_jax.geometry.safe import safe_divide
+from rein3d_jax.rasterize.composite import composite_chunks
+from rein3d_jax.rasterize.config import RasterizeConfig
+from rein3d_jax.rasterize.cull import gather_in_view, in_view
+from rein3d_jax.rasterize.pixels import features, from_tiles, grid, to_tiles
+from rein3d_jax.rasterize.project import project
+from rein3d_jax.rasterize.tile import bin_splats, needed_pairs
+from rein3d_jax.scene import Camera, Gaussians
+
+
+@struct.dataclass
+class Frame:
+    """What one camera sees."""
+
+    rgb: jax.Array  # (h, w, 3) premultiplied: the scene over black
+    alpha: jax.Array  # (h, w) in [0, 1)
+    distance: jax.Array  # (h, w) metres along the ray, mean over what is seen; 0 where nothing is
+    needed: jax.Array  # (3,) buffer sizes this view called for: visible, pairs, chunks
+    overflow: jax.Array  # () entries dropped; 0 or the picture is not the scene's
+
+
+def _rasterize(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig, probe: jax.Array | None = None):
+    if min(config.visible_capacity, config.pair_capacity, config.chunk_capacity) < 1:
+        raise InputError("rasterize: buffer capacities are 0; call allocate(gaussians, cameras, config=config) first")
+    if camera.model == EQUIRECTANGULAR and camera.width % config.tile:
+        raise InputError(f"rasterize.tile {config.tile} does not divide the panorama's width {camera.width}")
+    mask = in_view(jax.lax.stop_gradient(gaussians), camera, config=config)
+    seen, ids = gather_in_view(gaussians, mask, config.visible_capacity)
+    if probe is not None:
+        probe = jnp.take(probe, ids, axis=0, mode="clip")
+    splats = project(seen, camera, config=config, probe=probe)
+    chunks = bin_splats(jax.lax.stop_gradient(splats), camera, config=config)
+    needed = jnp.concatenate([jnp.sum(mask)[None], chunks.needed])
+    room = jnp.array([config.visible_capacity, config.pair_capacity, config.chunk_capacity])
+    overflow = jnp.sum(jnp.maximum(needed - room, 0))
+    tiled = composite_chunks(splats, chunks, to_tiles(features(camera), config.tile))
+    image = from_tiles(tiled, camera.height, camera.width, config.tile)
+    distance = safe_divide(image[..., 3], image[..., 4])
+    return Frame(image[..., :3], image[..., 4], distance, needed, overflow)
+
+
+rasterize = jax.jit(_rasterize, static_argnames=("config",))
+rasterize.__doc__ = """Gaussians, camera -> Frame. Pure; differentiable in every float of both.
+
+`config` must come from `allocate`; `probe` (n, 2) is `project`'s. Check `frame.overflow == 0`, or call
+`render`, which grows the buffers itself. Raises InputError where buffers are unset or the tile does not
+divide a panorama's width. Deterministic: the same inputs give the same bytes on a CPU."""
+
+
+def _measure(gaussians, camera, *, config):
+    mask = in_view(gaussians, camera, config=config)
+    pairs = needed_pairs(project(gaussians, camera, config=config), camera, config)
+    return jnp.stack([jnp.sum(mask), pairs])
+
+
+_measure = jax.jit(_measure, static_argnames=("config",))
+
+
+def _bucket(count: int) -> int:
+    """The next of 1, 1.25, 1.5, 1.75 x 2^k: near sizes share a compiled program, at most 25 % is idle."""
+    count = max(count, 64)
+    step = 1 << max(count.bit_length() - 3, 0)
+    return -(-count // step) * step
+
+
+def allocate(gaussians: Gaussians, cameras: Sequence[Camera], *, config: RasterizeConfig, slack: float = 1.1):
+    """The config with buffers measured on `cameras`, times `slack` for the motion of an optimisation.
+
+    Runs outside jit. An all-new camera may still overflow: `Frame.overflow` tells.
+    """
+    bare = dataclasses.replace(config, visible_capacity=0, pair_capacity=0, chunk_capacity=0)
+    visible, pairs = jnp.stack([_measure(gaussians, c, config=bare) for c in cameras]).max(axis=0)
+    rows, columns = grid(cameras[0], config.tile)
+    # Each tile wastes less than one chunk, so this bound holds whatever the spread over tiles.
+    chunks = int(pairs * slack) // config.chunk + rows * columns
+    return enlarge(config, int(visible * slack), int(pairs * slack), chunks)
+
+
+def enlarge(config: RasterizeConfig, visible: int, pairs: int, chunks: int) -> RasterizeConfig:
+    """The config with buffers of at least these sizes, never smaller than it had."""
+    return dataclasses.replace(
+        config,
+        visible_capacity=max(config.visible_capacity, _bucket(visible)),
+        pair_capacity=max(config.pair_capacity, _bucket(pairs)),
+        chunk_capacity=max(config.chunk_capacity, _bucket(chunks)),
+    )
+
+
+def render(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig) -> tuple[Frame, RasterizeConfig]:
+    """`rasterize` that allocates, and allocates again on overflow. Returns the config to reuse."""
+    if config.pair_capacity == 0:
+        config = allocate(gaussians, [camera], config=config)
+    while True:
+        frame = rasterize(gaussians, camera, config=config)
+        if int(frame.overflow) == 0:
+            return frame, config
+        config = enlarge(config, *(int(x * 1.1) for x in frame.needed))
