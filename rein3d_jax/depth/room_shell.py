@@ -1,0 +1,198 @@
+"""A distance for a photograph that has none: the box it was taken in, fitted to its own edges and colours.
+
+Scale comes from the camera's height alone: a camera k times as high sees the same picture in a room k times as
+large. What stands in the room is not modelled, so this is a room-shell distance, and whoever shows it says so.
+
+The fit maximises the mean edge support (picture_edges) along the box's twelve projected lines, which has many
+maxima: boxes climb from random starts, each on its own. A box whose size alone changes keeps its corners and
+ceiling lines, and its floor lines, hidden by furniture, are weak evidence: so the size is chosen by how well
+walls, ceiling and floor part the picture's colours (picture_parts) as well, and jaxopt refines on all of it.
+"""
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import jaxopt
+from flax import struct
+
+from rein3d_jax.depth.picture_edges import blur, edge_support, edge_tensors
+from rein3d_jax.depth.picture_parts import ROWS, colour_bins, mutual_information
+from rein3d_jax.depth.shell_outline import shell_edges, shell_parts
+from rein3d_jax.errors import InputError
+from rein3d_jax.geometry.safe import safe_norm
+from rein3d_jax.geometry.shell import RoomShell, meet_shell
+from rein3d_jax.geometry.sphere import pixel_rays
+
+WORKING_HEIGHT = 256  # pixels; the noise and blur scales are tied to it
+WIDE, SHARP = (1.0, 3.0), (0.7, 2.0)  # pixels of blur: to find the basin, and to end in it
+COARSE, FINE = 12, 32  # points along each line: to rank boxes, and to refine one
+STEPS = 0.7, 0.02  # log metres; how far the first and the last round of climbing reach
+YAW_STEP = 0.35  # radians for one log metre
+CHANGED = 0.4  # share of a child's parts that differ from its parent's
+SIZES = 41  # tried for each box, from 1/e to e times its own
+
+
+@dataclass(frozen=True)
+class RoomShellConfig:
+    """How a room is fitted. Ranges are in camera heights and only lean on the fit: they are no walls."""
+
+    camera_height: float = 1.6  # metres above the floor: the scale of everything
+    wall_range: tuple[float, float] = (0.6, 5.0)  # 1 to 8 m for a camera at 1.6 m
+    ceiling_range: tuple[float, float] = (0.375, 1.6)  # above the camera: 0.6 to 2.5 m
+    max_aspect: float = 2.0
+    prior: float = 0.3  # loss for one squared log unit outside the ranges
+    # Floor, ceiling and corner lines. Nothing stands before a ceiling line; furniture hides floor lines, and doors,
+    # windows and cupboards have vertical lines of their own.
+    edge_weights: tuple[float, float, float] = (0.5, 1.0, 0.5)
+    colour_weight: float = 0.7  # of one nat of mutual information, against full edge support
+    noise: float = 0.005  # picture_edges: the sRGB step per pixel that is half an edge
+    texture: float = 1.0  # picture_edges: how much an edge must stand out of its surroundings
+    climbers: int = 512
+    rounds: int = 16
+    children: int = 11
+    finalists: int = 8
+    seed: int = 0
+
+
+@struct.dataclass
+class _Evidence:
+    """All that is read off the picture."""
+
+    wide: jax.Array  # (h, w, 3) edge tensors
+    sharp: jax.Array  # (h, w, 3) edge tensors
+    bins: jax.Array  # (n, k) colour bins
+
+
+def fit_room_shell(rgb: jax.Array, *, config: RoomShellConfig) -> tuple[RoomShell, dict[str, float]]:
+    """The box around the camera of an upright panorama (h, 2h, 3) in sRGB, and how well the picture bears it out:
+    `support`, in [0, 1], the mean edge support along its lines (0.35 to 0.55 in furnished rooms), and `loss`.
+
+    Deterministic for a seed. Raises InputError for a picture without edges."""
+    height, width, channels = rgb.shape
+    assert width == 2 * height and channels == 3, rgb.shape
+    small = jax.image.resize(rgb, (WORKING_HEIGHT, 2 * WORKING_HEIGHT, 3), "linear")
+    # The fit is made in camera heights: another height compiles nothing anew.
+    camera_height, config = config.camera_height, replace(config, camera_height=1.0)
+    evidence = _evidence(small, config=config)
+    if float(jnp.max(evidence.sharp)) < 0.01:  # noise of half a grey level gives more
+        raise InputError("the picture shows no edges to fit a room to; give its distance map")
+    ends = [_refine(box, evidence, config) for box in _search(evidence, config=config)]
+    box, loss, support = min(ends, key=lambda end: end[1])
+    return _shell_from(box, camera_height), {"support": support, "loss": loss}
+
+
+def shell_distance(shell: RoomShell, height: int, width: int) -> jax.Array:
+    """(height, width) metres along each pixel's ray to the inside of the box, exact."""
+    return meet_shell(shell, jnp.zeros(3), pixel_rays(height, width))[0]
+
+
+def _shell_from(params: jax.Array, camera_height: float) -> RoomShell:
+    """(6,): yaw, then the logs of four walls and the ceiling in camera heights; the yaw within 45 degrees."""
+    quarters = jnp.round(params[0] / (jnp.pi / 2))
+    walls = jnp.roll(jnp.exp(params[1:5]), quarters.astype(jnp.int32))
+    height = jnp.asarray(camera_height, params.dtype)
+    return RoomShell(params[0] - quarters * jnp.pi / 2, walls * height, height, jnp.exp(params[5]) * height)
+
+
+@partial(jax.jit, static_argnames=("config",))
+def _evidence(rgb: jax.Array, config: RoomShellConfig) -> _Evidence:
+    tensors = edge_tensors(rgb, noise=config.noise, texture=config.texture)
+    wide, sharp = (sum(blur(tensors, sigma) for sigma in sigmas) / len(sigmas) for sigmas in (WIDE, SHARP))
+    return _Evidence(wide, sharp, colour_bins(rgb))
+
+
+def _support(shell: RoomShell, tensors: jax.Array, points: int, edge_weights: tuple[float, float, float]) -> jax.Array:
+    """Mean edge support along the twelve lines, weighted by the angle each piece spans -> () in [0, 1]."""
+    starts, ends = shell_edges(shell)
+    along = ((jnp.arange(points) + 0.5) / points)[:, None]
+    places = starts[:, None] + along * (ends - starts)[:, None]  # (12, points, 3)
+    normals = jnp.cross(starts, ends)
+    area = safe_norm(normals, keepdims=True)
+    # d(angle)/d(along) = |start x end| / |place|^2
+    weights = area / jnp.sum(places * places, axis=-1) * jnp.repeat(jnp.array(edge_weights), 4)[:, None]
+    support = edge_support(tensors, places, (normals / area)[:, None])
+    return jnp.sum(weights * support) / jnp.sum(weights)
+
+
+def _outside(x: jax.Array, low: jax.Array, high: jax.Array) -> jax.Array:
+    return jnp.sum(jnp.maximum(jnp.maximum(low - x, x - high), 0.0) ** 2)
+
+
+def _unlikely(box: jax.Array, config: RoomShellConfig) -> jax.Array:
+    """Squared log units by which a box is outside of what rooms are."""
+    aspect = jnp.logaddexp(box[1], box[3]) - jnp.logaddexp(box[2], box[4])
+    limit = jnp.log(config.max_aspect)
+    walls = _outside(box[1:5], *jnp.log(jnp.array(config.wall_range)))
+    return walls + _outside(box[5], *jnp.log(jnp.array(config.ceiling_range))) + _outside(aspect, -limit, limit)
+
+
+def _edge_loss(box: jax.Array, evidence: _Evidence, config: RoomShellConfig) -> jax.Array:
+    """What ranks boxes during the climb."""
+    support = _support(_shell_from(box, 1.0), evidence.wide, COARSE, config.edge_weights)
+    return 1 - support + config.prior * _unlikely(box, config)
+
+
+def _loss(box: jax.Array, evidence: _Evidence, config: RoomShellConfig) -> tuple[jax.Array, jax.Array]:
+    """What is minimised in the end, and the edge support in it."""
+    shell = _shell_from(box, 1.0)
+    support = _support(shell, evidence.sharp, FINE, config.edge_weights)
+    information = mutual_information(shell_parts(shell, ROWS, 2 * ROWS).reshape(-1, 3), evidence.bins)
+    return 1 - support - config.colour_weight * information + config.prior * _unlikely(box, config), support
+
+
+def _random_boxes(key: jax.Array, config: RoomShellConfig) -> jax.Array:
+    """(climbers, 6), uniform in yaw and in the logs of the ranges."""
+    low = jnp.array([-jnp.pi / 4, *jnp.log(jnp.array([config.wall_range[0]] * 4 + [config.ceiling_range[0]]))])
+    high = jnp.array([jnp.pi / 4, *jnp.log(jnp.array([config.wall_range[1]] * 4 + [config.ceiling_range[1]]))])
+    return jax.random.uniform(key, (config.climbers, 6), minval=low, maxval=high)
+
+
+def _climb(boxes: jax.Array, key: jax.Array, step: jax.Array, evidence: _Evidence, config: RoomShellConfig):
+    """Each box becomes the best of itself and of its children; (n, 6) -> (n, 6), (n,) losses. A child differs in
+    some of its parts, so that one wrong wall can be mended alone; its lengths tend to change together."""
+    parts, whole, chosen = jax.random.split(key, 3)
+    noise = jax.random.normal(parts, (config.children, *boxes.shape)).at[..., 0].multiply(YAW_STEP)
+    noise = noise.at[..., 1:].add(jax.random.normal(whole, (config.children, len(boxes), 1)))
+    noise *= jax.random.bernoulli(chosen, CHANGED, noise.shape)
+    family = jnp.concatenate([boxes[None], boxes + step * noise])
+    # In batches that stay within a few MB.
+    losses = jax.lax.map(lambda box: _edge_loss(box, evidence, config), family.reshape(-1, 6), batch_size=512)
+    losses = losses.reshape(-1, len(boxes))
+    return family[jnp.argmin(losses, axis=0), jnp.arange(len(boxes))], jnp.min(losses, axis=0)
+
+
+def _best_size(box: jax.Array, evidence: _Evidence, config: RoomShellConfig) -> jax.Array:
+    sizes = box + jnp.linspace(-1, 1, SIZES)[:, None] * jnp.array([0.0, 1, 1, 1, 1, 1])
+    return sizes[jnp.argmin(jax.vmap(lambda box: _loss(box, evidence, config)[0])(sizes))]
+
+
+@partial(jax.jit, static_argnames=("config",))
+def _search(evidence: _Evidence, config: RoomShellConfig) -> jax.Array:
+    """(finalists, 6): the best of many boxes that climbed from random starts, each in its best size."""
+    key, start = jax.random.split(jax.random.key(config.seed))
+    steps = STEPS[0] * (STEPS[1] / STEPS[0]) ** jnp.linspace(0, 1, config.rounds)
+    rounds = (jax.random.split(key, config.rounds), steps)
+    boxes = _random_boxes(start, config)
+    boxes, losses = jax.lax.scan(lambda boxes, x: _climb(boxes, *x, evidence, config), boxes, rounds)
+    boxes = boxes[jnp.argsort(losses[-1])[: config.finalists]]
+    return jax.lax.map(lambda box: _best_size(box, evidence, config), boxes)
+
+
+_loss_and_slope = jax.jit(jax.value_and_grad(_loss, has_aux=True), static_argnames=("config",))
+
+
+def _refine(box: jax.Array, evidence: _Evidence, config: RoomShellConfig) -> tuple[jax.Array, float, float]:
+    """The nearest local optimum, its loss and support, by L-BFGS-B: SciPy's through jaxopt, since jaxopt's own
+    LBFGS takes 15 CPU seconds to compile here and this one 4."""
+
+    def fun(box):
+        (loss, _), slope = _loss_and_slope(box, evidence, config)
+        return loss, slope
+
+    # jit=False: `fun` is jitted already, and jaxopt would compile it anew for every solver.
+    solver = jaxopt.ScipyMinimize(fun=fun, value_and_grad=True, method="L-BFGS-B", tol=1e-6, jit=False)
+    box = solver.run(box).params
+    (loss, support), _ = _loss_and_slope(box, evidence, config)
+    return box, float(loss), float(support)

@@ -1,0 +1,1 @@
+"""Distance -> safe camera paths and evaluation viewpoints."""

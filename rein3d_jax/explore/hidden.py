@@ -1,0 +1,44 @@
+"""What is still unseen: space behind the surfaces that the input panorama saw, the only place for a guess.
+
+Whatever lies in front of an observed surface would have been seen; so a restored surface found there is wrong, however
+well it looks from where it was restored, and would stand in the way everywhere else.
+"""
+
+import jax
+import jax.numpy as jnp
+
+from rein3d_jax.geometry.sphere import pixels_from_rays
+from rein3d_jax.scene import Panorama
+
+STEPS = 24  # places tried along a ray, 6 % apart; even, so that the guess itself is one of them
+MARGIN = 0.02  # relative: what lies this little in front of a surface lies on it
+
+
+@jax.jit
+def hidden_distance(panorama: Panorama, origin: jax.Array, rays: jax.Array, guess: jax.Array) -> jax.Array:
+    """The hidden place nearest to `guess` (h, w) metres along `rays` (h, w, 3) from `origin` (3,), world frame.
+
+    Hidden at or behind the surface that `panorama` (at the world's origin) shows in that direction. 0 where the ray
+    crosses no hidden place within twice the guess: a guess that would stand in seen space is no guess.
+    """
+    height, width = panorama.distance.shape
+    # From half the guess to twice it, evenly in log distance; the guess itself is one of the places.
+    factors = 2.0 ** jnp.linspace(-1.0, 1.0, STEPS + 1)
+
+    def cost(factor):
+        points = origin + rays * (guess * factor)[..., None]
+        u, v = pixels_from_rays(points, height, width)
+        column = jnp.clip(jnp.floor(u).astype(jnp.int32), 0, width - 1)
+        row = jnp.clip(jnp.floor(v).astype(jnp.int32), 0, height - 1)
+        seen = panorama.distance[row, column]
+        hidden = jnp.linalg.norm(points, axis=-1) >= seen * (1 - MARGIN)
+        return jnp.where(hidden, jnp.abs(jnp.log(factor)), jnp.inf)
+
+    def nearest(best, factor):
+        lowest, chosen = best
+        this = cost(factor)
+        return (jnp.minimum(lowest, this), jnp.where(this < lowest, factor, chosen)), None
+
+    start = (jnp.full(guess.shape, jnp.inf), jnp.zeros_like(guess))
+    (_, chosen), _ = jax.lax.scan(nearest, start, factors)
+    return guess * chosen
