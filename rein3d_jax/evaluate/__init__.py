@@ -1,0 +1,1 @@
+"""How good a scene is, in numbers and in pictures."""
