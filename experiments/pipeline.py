@@ -1,0 +1,169 @@
+"""The stages joined: one panorama in, one refined scene out. Pure of files; `reconstruct` reads, saves and resumes."""
+
+import dataclasses
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+from flax import struct
+
+from rein3d_jax.depth.complete import CompleteConfig
+from rein3d_jax.depth.shell_from_distance import shell_from_distance
+from rein3d_jax.explore.hidden import hidden_distance
+from rein3d_jax.explore.profile import ExploreConfig
+from rein3d_jax.explore.trajectories import Trajectories
+from rein3d_jax.geometry.poses import equirectangular_camera, rigid
+from rein3d_jax.geometry.sphere import rays_of_pose, world_from_camera_axes
+from rein3d_jax.lift import LiftConfig, compact, lift, merge, with_capacity
+from rein3d_jax.rasterize import RasterizeConfig, allocate, enlarge, render
+from rein3d_jax.refine import RefineConfig, Views, join_views, refine, views_from_panorama
+from rein3d_jax.restore import Background, RestoreConfig, background_of, restorer
+from rein3d_jax.scene import Gaussians, Panorama, Video
+
+GOLDEN_TURN = 2.399963  # radians: successive multiples spread the cuts between a trajectory's views evenly
+
+
+@dataclasses.dataclass(frozen=True)
+class Stages:
+    """One config for each stage."""
+
+    depth: CompleteConfig = CompleteConfig()
+    lift: LiftConfig = LiftConfig()
+    explore: ExploreConfig = ExploreConfig()
+    rasterize: RasterizeConfig = RasterizeConfig()
+    restore: RestoreConfig = RestoreConfig()
+    refine: RefineConfig = RefineConfig()
+
+
+def origin_pose() -> jax.Array:
+    """world_from_camera (4, 4) of the input panorama."""
+    return rigid(world_from_camera_axes(), jnp.zeros(3))
+
+
+def lift_scene(panorama: Panorama, config: LiftConfig) -> Gaussians:
+    """The coarse scene, in a buffer with room for what exploring will add."""
+    everywhere = jnp.ones(panorama.distance.shape, bool)
+    placed = panorama.replace(valid=everywhere)  # an unknown distance was completed; its colour is known
+    return with_capacity(lift(placed, origin_pose(), everywhere, config=config), config.capacity)
+
+
+def render_video(gaussians: Gaussians, poses: jax.Array, height: int, raster: RasterizeConfig):
+    """Panoramas along `poses` (t, 4, 4) -> (Video with colour un-premultiplied, the config with grown buffers)."""
+    frames = []
+    for pose in poses:
+        frame, raster = render(gaussians, equirectangular_camera(pose, height), config=raster)
+        frames.append((frame.rgb / jnp.maximum(frame.alpha, 1e-6)[..., None], frame.alpha, frame.distance))
+    rgb, alpha, distance = (jnp.stack(part) for part in zip(*frames, strict=True))
+    return Video(jnp.clip(rgb, 0, 1), alpha, distance, poses), raster
+
+
+def _fuse(scene: Gaussians, degraded: Video, restored: Video, panorama: Panorama, stages: Stages, raster):
+    """Lift a restored video into what `scene` leaves open, farthest frame first: it opens the largest holes, and the
+    nearer ones then see them closed. Returns (scene, overflow, raster)."""
+    overflow, last = 0, restored.rgb.shape[0] - 1
+    # Edges were snapped when the input was lifted; a guess has none to mend, and every pixel of it is lifted.
+    config = dataclasses.replace(stages.lift, snap_edges=False, stride=1)
+    for index in range(last, 0, -stages.restore.fuse_every):
+        camera = equirectangular_camera(restored.world_from_camera[index], restored.rgb.shape[1])
+        alpha = degraded.alpha[index]
+        if index < last or not stages.restore.sequential:  # the scene has grown since the video was rendered
+            frame, raster = render(scene, camera, config=raster)
+            alpha = frame.alpha
+        guess, hole = _guess(restored, index, alpha, panorama, stages)
+        scene, dropped = merge(scene, lift(guess, camera.world_from_camera, hole, config=config))
+        overflow += int(dropped)
+    return scene, overflow, raster
+
+
+def _guess(video: Video, index: int, alpha: jax.Array, panorama: Panorama, stages: Stages):
+    """Frame `index` with its guesses moved into unseen space, and the holes (h, w) that they are to fill."""
+    rgb, distance, pose = (x[index] for x in (video.rgb, video.distance, video.world_from_camera))
+    place = hidden_distance(panorama, pose[:3, 3], rays_of_pose(pose, *distance.shape), distance)
+    return Panorama(rgb, place, place > 0), (alpha < stages.restore.observed) & (place > 0)
+
+
+@struct.dataclass
+class Restored:
+    """The job's state after a trajectory: enough to go on with the next one, to the bit."""
+
+    scene: Gaussians
+    video: Video  # the trajectory's frames, holes filled; alpha still says what was observed
+    overflow: jax.Array  # () Gaussians that found no slot in the scene's buffer, so far
+    buffers: jax.Array  # (3,) the rasterizer's capacities: sums over other buffer sizes round otherwise
+
+
+def restore_trajectory(
+    coarse: Gaussians,
+    panorama: Panorama,
+    trajectories: Trajectories,
+    index: int,
+    last: Restored | None,
+    key: jax.Array,
+    *,
+    stages: Stages,
+    background: Background | None,
+) -> Restored:
+    """The state after trajectory `index`; `last` is the one before, None at the first (paper Sec. 3.1, 3.2).
+    `background` is what `room_background` found."""
+    if last is None:
+        scene, overflow, raster = coarse, 0, _first_buffers(coarse, trajectories, stages)
+    else:
+        scene, overflow = last.scene, int(last.overflow)
+        raster = enlarge(stages.rasterize, *(int(x) for x in last.buffers))
+    poses = trajectories.world_from_camera[index, : int(trajectories.counts[index])]
+    seen = scene if stages.restore.sequential else coarse
+    degraded, raster = render_video(seen, poses, stages.restore.height, raster)
+    restored = restorer(stages.restore, background)(degraded, jax.random.fold_in(key, index))
+    if stages.restore.method != "none":
+        scene, dropped, raster = _fuse(scene, degraded, restored, panorama, stages, raster)
+        overflow += dropped
+    buffers = jnp.array([raster.visible_capacity, raster.pair_capacity, raster.chunk_capacity])
+    return Restored(scene, restored, jnp.asarray(overflow), buffers)
+
+
+def _first_buffers(coarse: Gaussians, trajectories: Trajectories, stages: Stages) -> RasterizeConfig:
+    ends = [poses[int(n) - 1] for poses, n in zip(trajectories.world_from_camera, trajectories.counts, strict=True)]
+    cameras = [equirectangular_camera(pose, stages.restore.height) for pose in ends]
+    # What exploring adds needs room too; 1.5 keeps most runs from compiling the rasterizer twice.
+    return allocate(coarse, cameras, config=stages.rasterize, slack=1.5)
+
+
+def room_background(panorama: Panorama, config: RestoreConfig) -> Background | None:
+    """The room's shell with its colours, or None where what was seen is no box."""
+    shell, support = shell_from_distance(panorama)
+    return background_of(panorama, shell) if float(support) >= config.shell_support else None
+
+
+def collect_views(panorama: Panorama, videos: list[Video], *, stages: Stages) -> Views:
+    """Perspective views of the input panorama and of every restored frame but the origin's, weighed by trust."""
+    config, whole = stages.refine, jnp.ones(panorama.distance.shape)
+    parts = [
+        views_from_panorama(panorama.rgb, config.observed_weight * whole, origin_pose(), turn=turn, config=config)
+        for turn in (0.0, jnp.pi / 4)
+    ]
+    for video in videos:
+        weight = jnp.where(video.alpha >= stages.restore.observed, config.observed_weight, config.restored_weight)
+        weight = jnp.where(video.distance > 0, weight, 0.0)
+        for index in range(1, video.rgb.shape[0]):
+            pose, turn = video.world_from_camera[index], (index * GOLDEN_TURN) % (jnp.pi / 2)
+            parts.append(views_from_panorama(video.rgb[index], weight[index], pose, turn=float(turn), config=config))
+    return join_views(*parts)
+
+
+def scene_extent(panorama: Panorama) -> float:
+    """Metres: the median known distance, the length that rates and sizes are measured in."""
+    return float(jnp.nanmedian(jnp.where(panorama.valid, panorama.distance, jnp.nan)))
+
+
+def refine_scene(
+    scene: Gaussians,
+    views: Views,
+    extent: float,
+    key: jax.Array,
+    *,
+    stages: Stages,
+    on_step: Callable[[int], None] = lambda step: None,
+) -> tuple[Gaussians, dict]:
+    """The refined scene and its curves (paper Sec. 3.3)."""
+    scene = compact(scene, spare=stages.refine.spare)
+    return refine(scene, views, extent, key, config=stages.refine, raster=stages.rasterize, on_step=on_step)
