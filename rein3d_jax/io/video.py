@@ -14,7 +14,7 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.io.atomic import write_bytes
 from rein3d_jax.io.image import to_uint8
 
-_CRF = "16"  # visually lossless: a panning photograph, 1024 x 512, comes back at 40 dB in 60 kB a second
+_CRF = "16"  # visually lossless: a panning photograph, 1024 x 512, comes back at 43 dB in 100 kB a second
 _SCALING = Interpolation.AREA | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INP | Interpolation.BITEXACT
 
 
@@ -37,8 +37,9 @@ def write_mp4(path: str | Path, frames: Iterable[np.ndarray], fps: float) -> Non
 
 
 def _add_stream(container: av.container.OutputContainer, shape: tuple[int, ...], fps: float) -> av.VideoStream:
-    # One thread: x264's choices depend on how many it has.
-    options = {"crf": _CRF, "preset": "medium", "threads": "1"}
+    # One thread: x264's choices depend on how many it has. No macroblock tree: its AVX-512 code reads memory that
+    # nothing wrote, and one small film in three came out different (tests/io; x264 core 165).
+    options = {"crf": _CRF, "preset": "medium", "threads": "1", "x264-params": "mbtree=0"}
     stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001), options=options)
     context = stream.codec_context
     context.height, context.width, context.pix_fmt = shape[0], shape[1], "yuv420p"
