@@ -89,7 +89,7 @@ class Restored:
     scene: Gaussians
     video: Video  # the trajectory's frames, holes filled; alpha still says what was observed
     overflow: jax.Array  # () Gaussians that found no slot in the scene's buffer, so far
-    buffers: jax.Array  # (3,) the rasterizer's capacities: sums over other buffer sizes round otherwise
+    buffers: jax.Array  # (4,) the rasterizer's capacities: sums over other buffer sizes round otherwise
 
 
 def restore_trajectory(
@@ -117,7 +117,7 @@ def restore_trajectory(
     if stages.restore.method != "none":
         scene, dropped, raster = _fuse(scene, degraded, restored, panorama, stages, raster)
         overflow += dropped
-    buffers = jnp.array([raster.visible_capacity, raster.pair_capacity, raster.chunk_capacity])
+    buffers = jnp.array(raster.buffers)
     return Restored(scene, restored, jnp.asarray(overflow), buffers)
 
 

@@ -2,110 +2,118 @@
 
     w_i = alpha_i T_i,   T_{i+1} = T_i (1 - alpha_i),   image = sum_i w_i value_i     (Kerbl et al. 2023, eq. 3)
 
-A chunk is a scan over its Gaussians, vectorised over chunks x pixels with the pixels innermost (3 ns an
-evaluation on 2 cores here; chunks innermost took 10, see benchmarks/NOTES.md). Chunks of a tile join by the
-associative "over". The reverse pass walks front to back too, with the weighted sum still to come as its
-carry, so nothing per evaluation is stored and nothing is divided by a small transmittance.
+A chunk is a loop over its Gaussians, vectorised over chunks x pixels with the pixels innermost, a few Gaussians a
+turn: the carry then travels to the cache less often. A turn gathers its Gaussians' numbers itself, so that nothing is
+stored for a (Gaussian, tile) pair but its index. Chunks of a tile join by the associative "over". The reverse pass
+walks front to back too, with the weighted sum still to come as its carry, so nothing per evaluation is stored and
+nothing is divided by a small transmittance; its sums over pixels are products with the pixels' monomials. What each
+of these gains is in benchmarks/NOTES.md.
 """
 
 import math
-from functools import partial
 
 import jax
 import jax.numpy as jnp
 
 from rein3d_jax.conventions import ALPHA_CUT, ALPHA_MAX
+from rein3d_jax.rasterize.pixels import tile_pixels
+from rein3d_jax.rasterize.project import Splats
+from rein3d_jax.rasterize.quadratic import axes_entries, coefficients, evaluate, monomials, terms
 from rein3d_jax.rasterize.tile import Chunks
+from rein3d_jax.scene import Camera
 
 BLOCK = 512  # chunks handled at a time: their carry fits a core's second-level cache
+TURN = 4  # Gaussians a turn of the loop
+EMPTY = -100.0  # log opacity of a slot without a Gaussian: alpha 0
 
 
-def gather_rows(mean, axes, log_opacity, values, ids, anchors):
-    """Per-slot rows (l, m, c): whitened offset of the chunk's anchor (k), axes (k^2), log opacity, values.
-
-    `anchors` (c, k) is a feature near each chunk's tile: offsets from it stay small, so float32 suffices.
-    An empty slot has log opacity -100, alpha 0.
-    """
-    n, k = mean.shape
-    rows = jnp.concatenate([mean, axes.reshape(n, k * k), log_opacity[:, None], values], axis=-1)
-    empty = jnp.zeros((1, rows.shape[1])).at[0, k + k * k].set(-100.0)
-    rows = jnp.concatenate([rows, empty])[ids]
-    offset = anchors - rows[..., :k]
-    head = [jnp.sum(rows[..., k * (i + 1) : k * (i + 2)] * offset, axis=-1) for i in range(k)]
-    return jnp.moveaxis(jnp.concatenate([jnp.stack(head, axis=-1), rows[..., k:]], axis=-1), -1, 1)
+def splat_table(splats: Splats, values: jax.Array) -> jax.Array:
+    """All that compositing reads of splats with values (n, v), and an empty one: (n + 1, m). A row is the mean, the
+    stored entries of the axes, the log opacity, the values."""
+    k = splats.mean.shape[1]
+    axes = [splats.axes[:, i, j] for i, j in axes_entries(k)]
+    table = jnp.stack([*splats.mean.T, *axes, splats.log_opacity, *values.T], axis=-1)
+    return jnp.concatenate([table, jnp.zeros_like(table[:1]).at[0, k + len(axes)].set(EMPTY)])
 
 
-def _alpha(row, pixels):
-    """row (m, c), pixels k x (c or 1, p) -> whitened offsets k x (c, p), raw and cut, clamped alpha (c, p)."""
-    k = len(pixels)
-    white = [
-        row[i][:, None] + sum(row[k * (i + 1) + j][:, None] * pixels[j] for j in range(k)) for i in range(k)
-    ]
-    raw = jnp.exp(row[k + k * k][:, None] - 0.5 * sum(w * w for w in white))
-    return white, raw, jnp.where(raw < ALPHA_CUT, 0.0, jnp.minimum(raw, ALPHA_MAX))
+def _unpack(rows: jax.Array, anchors: jax.Array) -> tuple[list, list]:
+    """Rows (u, b, m) of the table, the chunks' anchors (b, k) -> terms(k) coefficients and v values, each (u, b)."""
+    k = anchors.shape[1]
+    entries, columns = axes_entries(k), list(jnp.moveaxis(rows, -1, 0))
+    offset = [anchor - mean for anchor, mean in zip(anchors.T, columns[:k], strict=True)]
+    axes = dict(zip(entries, columns[k:], strict=False))
+    log_opacity, *values = columns[k + len(entries) :]
+    return coefficients(offset, axes, log_opacity), values
 
 
-def _first_value(k: int) -> int:
-    return k + k * k + 1
+def _alpha(row, planes):
+    """Coefficients (terms(k) x (b,)), pixels k x (b or 1, p) -> raw and cut, clamped alpha (b, p)."""
+    raw = jnp.exp(evaluate([c[:, None] for c in row], planes))
+    return raw, jnp.where(raw < ALPHA_CUT, 0.0, jnp.minimum(raw, ALPHA_MAX))
 
 
-def _planes(pixels):
-    return tuple(jnp.moveaxis(pixels, -1, 0))
+class _Blocks:
+    """The chunks in use, block by block. Loops have as many turns as there are chunks and Gaussians: buffers may be
+    roomy at no cost."""
+
+    def __init__(self, chunks: Chunks, anchors: jax.Array, pixels: jax.Array):
+        length, capacity = chunks.ids.shape
+        self.chunks, self.anchors, self.pixels = chunks, anchors, pixels
+        self.block, self.turn = math.gcd(capacity, BLOCK), math.gcd(length, TURN)
+        self.count = -(-jnp.sum(chunks.fill > 0) // self.block)
+
+    def part(self, x: jax.Array, index) -> jax.Array:
+        """The block's rows of x (c, ...)."""
+        return jax.lax.dynamic_slice_in_dim(x, index * self.block, self.block)
+
+    def by_tile(self, x: jax.Array, index) -> jax.Array:
+        """The rows of x (tiles, ...) that belong to the block's chunks."""
+        return jnp.take(x, self.part(self.chunks.tile, index), axis=0, mode="clip")
+
+    def planes(self, index) -> list[jax.Array]:
+        """Pixel offsets of the block: k arrays (block, p), or (1, p) where all tiles have the same."""
+        pixels = self.pixels if self.pixels.shape[0] == 1 else self.by_tile(self.pixels, index)
+        return list(jnp.moveaxis(pixels, 1, 0))
+
+    def turns(self, index) -> jax.Array:
+        """As many as the block's first chunk needs, which is its fullest."""
+        return -(-self.chunks.fill[index * self.block] // self.turn)
+
+    def rows(self, table: jax.Array, index, number) -> jax.Array:
+        """Rows (turn, block, m) of the table for turn `number` of the block."""
+        place = (number * self.turn, index * self.block)
+        return table[jax.lax.dynamic_slice(self.chunks.ids, place, (self.turn, self.block))]
 
 
-def _in_blocks(function, start, used, *inputs):
-    """Run `function(block of each input) -> block of each output` over the first `used` chunks and put the blocks
-    into `start`. Inputs and outputs are pairs of an array and its axis of chunks; an axis None means shared by all.
+def _chunk_layers(table, anchors, pixels, chunks):
+    """Each chunk alone: weighted values and, last, transmittance (c, v + 1, p)."""
+    blocks, area = _Blocks(chunks, anchors, pixels), pixels.shape[2]
+    values = table.shape[1] - anchors.shape[1] - len(axes_entries(anchors.shape[1])) - 1
 
-    A loop with as many turns as there are chunks in use: buffers may be roomy at no cost, and a block's carry stays
-    in the cache.
-    """
-    capacity = start[0][0].shape[start[0][1]]
-    block = math.gcd(capacity, BLOCK)
+    def composite_block(index, layers):
+        near, planes = blocks.by_tile(anchors, index), blocks.planes(index)
 
-    def turn(index, outputs):
-        first = index * block
-        parts = [x if axis is None else jax.lax.dynamic_slice_in_dim(x, first, block, axis) for x, axis in inputs]
-        results = function(*parts)
-        placed = zip(outputs, results, start, strict=True)
-        return tuple(jax.lax.dynamic_update_slice_in_dim(out, new, first, axis) for out, new, (_, axis) in placed)
+        def turn(number, state):
+            through, sums = state
+            of_terms, of_values = _unpack(blocks.rows(table, index, number), near)
+            for u in range(blocks.turn):
+                weight = _alpha([c[u] for c in of_terms], planes)[1] * through
+                sums = [s + weight * value[u][:, None] for s, value in zip(sums, of_values, strict=True)]
+                through = through - weight
+            return through, sums
 
-    turns = (jnp.minimum(used, capacity) + block - 1) // block
-    return jax.lax.fori_loop(0, turns, turn, tuple(x for x, _ in start))
+        empty = jnp.zeros((blocks.block, area), table.dtype)
+        through, sums = jax.lax.fori_loop(0, blocks.turns(index), turn, (empty + 1, [empty] * values))
+        return jax.lax.dynamic_update_slice_in_dim(layers, jnp.stack([*sums, through], 1), index * blocks.block, 0)
 
-
-def _chunk_axis(pixels):
-    """Axis of `pixels` (c or 1, p, k) that runs over chunks: None where all share the same."""
-    return None if pixels.shape[0] == 1 else 0
-
-
-def _forward_scan(rows, pixels, used):
-    """Transmittance (c, p) and weighted values (c, p, v) of each chunk alone."""
-    first_value = _first_value(pixels.shape[-1])
-    count, chunks, area = rows.shape[1] - first_value, rows.shape[2], pixels.shape[1]
-
-    def block(rows, pixels):
-        planes = _planes(pixels)
-        shape = (rows.shape[2], area)
-
-        def step(carry, row):
-            through, sums = carry
-            weight = _alpha(row, planes)[2] * through
-            sums = tuple(s + weight * row[first_value + i][:, None] for i, s in enumerate(sums))
-            return (through - weight, sums), None
-
-        start = (jnp.ones(shape), tuple(jnp.zeros(shape) for _ in range(count)))
-        (through, sums), _ = jax.lax.scan(step, start, rows)
-        return through, jnp.stack(sums, axis=-1)
-
-    start = ((jnp.ones((chunks, area)), 0), (jnp.zeros((chunks, area, count)), 0))
-    return _in_blocks(block, start, used, (rows, 2), (pixels, _chunk_axis(pixels)))
+    start = jnp.zeros((chunks.tile.shape[0], values + 1, area), table.dtype)
+    return jax.lax.fori_loop(0, blocks.count, composite_block, start)
 
 
 def _along_tile(operator, values, rank):
-    """Inclusive scan of `values` (c, p) by `operator` over each tile's chunks, whose places in their tile are `rank`
-    (c,). Hillis and Steele's doubling, in as many turns as the longest list calls for; lax.associative_scan says the
-    same in 10 times the compilation time."""
+    """Inclusive scan of `values` (c, p), listed by tile, by `operator` over each tile's chunks, whose places in their
+    tile are `rank` (c,). Hillis and Steele's doubling, in as many turns as the longest list calls for;
+    lax.associative_scan says the same in 10 times the compilation time."""
 
     def double(state):
         shift, values = state
@@ -116,77 +124,90 @@ def _along_tile(operator, values, rank):
     return jax.lax.while_loop(lambda state: state[0] <= longest, double, (jnp.int32(1), values))[1]
 
 
-def _before(through, rank):
-    """Exclusive product of `through` (c, p) over a tile's earlier chunks."""
-    product = jnp.roll(_along_tile(jnp.multiply, through, rank), 1, axis=0)
-    return jnp.where((rank == 0)[:, None], 1.0, product)
+def _before(through, chunks):
+    """Product of `through` (c, p) over the earlier chunks of each chunk's tile."""
+    product = jnp.roll(_along_tile(jnp.multiply, through[chunks.order], chunks.rank), 1, axis=0)
+    return jnp.where((chunks.rank == 0)[:, None], 1.0, product)[chunks.position]
 
 
-@partial(jax.custom_vjp, nondiff_argnums=(4,))
-def composite(rows: jax.Array, pixels: jax.Array, chunk_tile: jax.Array, rank: jax.Array, tiles: int):
-    """rows (l, m, c) of `gather_rows`, pixels (c or 1, p, k) relative to the anchors -> image (tiles, p, v + 1):
-    the weighted values and, last, alpha = 1 - transmittance. Differentiable in `rows` only."""
-    return _composite_forward(rows, pixels, chunk_tile, rank, tiles)[0]
+@jax.custom_vjp
+def composite(table: jax.Array, anchors: jax.Array, pixels: jax.Array, chunks: Chunks) -> jax.Array:
+    """`splat_table`, anchors (tiles, k), pixels (1 or tiles, k, p) relative to them -> image (tiles, v + 1, p): the
+    weighted values and, last, alpha. Differentiable in `table` only."""
+    return _composite_forward(table, anchors, pixels, chunks)[0]
 
 
-def _composite_forward(rows, pixels, chunk_tile, rank, tiles):
-    through, sums = _forward_scan(rows, pixels, jnp.sum(chunk_tile < tiles))
-    before = _before(through, rank)
-    layers = jnp.concatenate([sums, 1.0 - through[..., None]], axis=-1) * before[..., None]
-    image = jax.ops.segment_sum(layers, chunk_tile, num_segments=tiles + 1, indices_are_sorted=True)[:tiles]
-    return image, (rows, pixels, chunk_tile, rank, before, layers, image)
+def _composite_forward(table, anchors, pixels, chunks):
+    layers, tiles = _chunk_layers(table, anchors, pixels, chunks), anchors.shape[0]
+    before = _before(layers[:, -1], chunks)
+    layers = layers.at[:, -1].set(1.0 - layers[:, -1]) * before[:, None]
+    image = jax.ops.segment_sum(layers, chunks.tile, num_segments=tiles + 1)[:tiles]
+    return image, (table, anchors, pixels, chunks, before, layers, image)
 
 
-def _composite_backward(tiles, residuals, gradient):
+def _still_to_come(gradient, layers, image, chunks):
+    """(c, p): what the chunk and those behind it add to the loss, sum_i w_i value_i . g."""
+    here = jnp.sum(layers * jnp.take(gradient, chunks.tile, axis=0, mode="clip"), axis=1)
+    ahead = _along_tile(jnp.add, here[chunks.order], chunks.rank)[chunks.position] - here
+    return jnp.take(jnp.sum(gradient * image, axis=1), chunks.tile, axis=0, mode="clip") - ahead
+
+
+def _moments(power, planes):
+    """Sums over pixels of `power` (u, b, p) times each monomial of the planes: terms(k) arrays (u, b)."""
+    basis = monomials(planes)
+    if planes[0].shape[0] > 1:  # a panorama's tiles differ
+        moments = jnp.einsum("ubp,bkp->ubk", power, jnp.stack(basis, axis=1), precision="highest")
+    else:
+        # Pixels stay innermost on the left: the same product written the other way makes XLA transpose, and took 5 x.
+        moments = jnp.einsum("ubp,pk->ubk", power, jnp.concatenate(basis).T, precision="highest")
+    return [moments[..., i] for i in range(terms(len(planes)))]
+
+
+def _composite_backward(residuals, gradient):
     """d L / d alpha_i = T_i (value_i . g) - (sum_{j>i} w_j value_j . g) / (1 - alpha_i), with alpha's own
     channel counted as a value of 1. `rest` carries the sum still behind, this one included."""
-    rows, pixels, chunk_tile, rank, before, layers, image = residuals
-    first_value = _first_value(pixels.shape[-1])
-    count = rows.shape[1] - first_value
-    pulls = jnp.concatenate([gradient, jnp.zeros_like(gradient[:1])])[chunk_tile]
-    total = jnp.concatenate([jnp.sum(gradient * image, axis=-1), jnp.zeros_like(gradient[:1, :, 0])])[chunk_tile]
-    here = jnp.sum(layers * pulls, axis=-1)
-    rest = total - (_along_tile(jnp.add, here, rank) - here)
+    table, anchors, pixels, chunks, before, layers, image = residuals
+    rest = _still_to_come(gradient, layers, image, chunks)
+    blocks, ones = _Blocks(chunks, anchors, pixels), jnp.ones(pixels.shape[2], table.dtype)
 
-    def block(rows, pixels, before, rest, pulls):
-        planes, g = _planes(pixels), _planes(pulls)
+    def reverse_block(index, of_slots):
+        near, planes = blocks.by_tile(anchors, index), blocks.planes(index)
+        pull = list(jnp.moveaxis(blocks.by_tile(gradient, index), 1, 0))
 
-        def step(carry, row):
-            through, rest = carry
-            white, raw, alpha = _alpha(row, planes)
-            weight = alpha * through
-            seen = sum((row[first_value + i][:, None] * g[i] for i in range(count)), g[count])
-            rest = rest - weight * seen
-            slope = through * seen - rest / (1.0 - alpha)
-            # The cut and the clamp are flat: no gradient passes there.
-            power = jnp.where((raw >= ALPHA_CUT) & (raw <= ALPHA_MAX), slope * raw, 0.0)
-            offsets = [-power * w for w in white]
-            sums = [*offsets, *(offset * x for offset in offsets for x in planes), power]
-            sums += [weight * g[i] for i in range(count)]
-            return (through - weight, rest), jnp.stack([jnp.sum(s, axis=-1) for s in sums])
+        def turn(number, state):
+            through, rest, of_slots = state
+            rows = blocks.rows(table, index, number)
+            (of_terms, of_values), chain = jax.vjp(lambda x: _unpack(x, near), rows)
+            powers, weights = [], []
+            for u in range(blocks.turn):
+                raw, alpha = _alpha([c[u] for c in of_terms], planes)
+                weight = alpha * through
+                seen = sum((x[u][:, None] * g for x, g in zip(of_values, pull, strict=False)), pull[-1])
+                rest = rest - weight * seen
+                slope = through * seen - rest / (1.0 - alpha)
+                # The cut and the clamp are flat: no gradient passes there.
+                powers.append(jnp.where((raw >= ALPHA_CUT) & (raw <= ALPHA_MAX), slope * raw, 0.0))
+                weights.append(weight)
+                through = through - weight
+            weights = jnp.stack(weights)
+            sums = [jnp.matmul(weights * g, ones, precision="highest") for g in pull[:-1]]
+            (of_rows,) = chain((_moments(jnp.stack(powers), planes), sums))
+            place = (number * blocks.turn, index * blocks.block, 0)
+            return through, rest, jax.lax.dynamic_update_slice(of_slots, of_rows, place)
 
-        return (jax.lax.scan(step, (before, rest), rows)[1],)
+        start = (blocks.part(before, index), blocks.part(rest, index), of_slots)
+        return jax.lax.fori_loop(0, blocks.turns(index), turn, start)[2]
 
-    inputs = ((rows, 2), (pixels, _chunk_axis(pixels)), (before, 0), (rest, 0), (pulls, 0))
-    (grads,) = _in_blocks(block, ((jnp.zeros_like(rows), 2),), jnp.sum(chunk_tile < tiles), *inputs)
-    return grads, None, None, None
+    start = jnp.zeros((*chunks.ids.shape, table.shape[1]), table.dtype)
+    of_slots = jax.lax.fori_loop(0, blocks.count, reverse_block, start)
+    # Rows are added in the order of the slots, one after the other on a CPU: the same bytes every time. A GPU adds
+    # them atomically unless XLA_FLAGS has --xla_gpu_deterministic_ops=true.
+    return jnp.zeros_like(table).at[chunks.ids].add(of_slots), None, None, None
 
 
 composite.defvjp(_composite_forward, _composite_backward)
 
 
-def composite_chunks(splats, chunks: Chunks, tile_features: jax.Array) -> jax.Array:
-    """Splats (project.Splats), their chunks and the tiles' pixel features (tiles, p, k) -> (tiles, p, 5):
-    premultiplied rgb, distance x weight, alpha."""
-    tiles = tile_features.shape[0]
-    values = jnp.concatenate([splats.rgb, splats.distance[:, None]], axis=-1)
-    centres = jnp.mean(tile_features, axis=1)
-    tile = jnp.minimum(chunks.tile, tiles - 1)
-    if tile_features.shape[-1] == 2:  # a flat image: every tile has the first one's pixels about its centre
-        # From the first pixel, since the mean of a tile that sticks out of the image is not its centre.
-        centres = tile_features[:, 0] + (centres[0] - tile_features[0, 0])
-        pixels = (tile_features[0] - centres[0])[None]
-    else:
-        pixels = (tile_features - centres[:, None])[tile]
-    rows = gather_rows(splats.mean, splats.axes, splats.log_opacity, values, chunks.ids, centres[tile])
-    return composite(rows, pixels, chunks.tile, chunks.rank, tiles)
+def composite_chunks(splats: Splats, values: jax.Array, chunks: Chunks, camera: Camera, tile: int) -> jax.Array:
+    """Splats with their values (n, v) and chunks -> (tiles, v + 1, tile^2): premultiplied values and, last, alpha."""
+    return composite(splat_table(splats, values), *tile_pixels(camera, tile), chunks)

@@ -8,15 +8,17 @@ from rein3d_jax.errors import InputError
 
 @dataclasses.dataclass(frozen=True)
 class RasterizeConfig:
-    """The last three are buffer sizes: 0 means "measure them", which `allocate` and `render` do."""
+    """The last four are buffer sizes: 0 means "measure them", which `allocate` and `render` do."""
 
     antialias: bool = True  # scale opacity by what the screen-space filter spread out (Mip-Splatting, eq. 9)
+    distance: bool = True  # composite the distance too; without it a frame has none, and compositing is faster
     filter_variance: float = 0.3  # pixels^2 added to every footprint (3DGS and gsplat)
     near: float = NEAR  # metres
     far: float = FAR  # metres
     tile: int = 8  # pixels; 8 x 8 beats 16 x 16 for pixel-sized splats (design.md)
     chunk: int = 32  # Gaussians composited before joining a tile's chunks
     visible_capacity: int = 0  # Gaussians in view
+    row_capacity: int = 0  # (Gaussian, row of tiles) pairs
     pair_capacity: int = 0  # (Gaussian, tile) pairs
     chunk_capacity: int = 0  # chunks over all tiles
 
@@ -27,3 +29,8 @@ class RasterizeConfig:
             raise InputError("rasterize.tile and rasterize.chunk must be at least 1")
         if self.filter_variance <= 0:
             raise InputError("rasterize.filter_variance must be above 0: a splat thinner than a pixel would vanish")
+
+    @property
+    def buffers(self) -> tuple[int, int, int, int]:
+        """The buffer sizes, in the order of `Frame.needed`."""
+        return self.visible_capacity, self.row_capacity, self.pair_capacity, self.chunk_capacity

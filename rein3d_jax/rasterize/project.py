@@ -37,7 +37,9 @@ class Splats:
     rgb: jax.Array  # (n, 3)
     distance: jax.Array  # (n,) metres along the ray; also the order of compositing
     visible: jax.Array  # (n,) bool
+    support: jax.Array  # (n,) sigmas to the 1/255 cut
     box: jax.Array  # (n, 4) left, top, right, bottom in pixels; equirectangular left may be negative
+    place: jax.Array  # (n, 3) azimuth, latitude and angular reach of the support in radians; (n, 0) for a pinhole
 
 
 def _whitening(cov_xx, cov_xy, cov_yy, det):
@@ -107,10 +109,17 @@ def _equirectangular(points, spread, distance, camera, config):
     return direction, axes, factor, sigma[:, None], in_range & (sigma < MAX_ANGULAR_SIGMA)
 
 
-def _sphere_box(direction, angle, camera):
-    """Pixel box (n, 4) of the cap of `angle` radians around `direction`; the whole row where it holds a pole."""
+def _sphere_place(direction, reach):
+    """Azimuth, latitude and, of a chord `reach` (n,), the angle: (n, 3) radians."""
     azimuth = jnp.arctan2(direction[:, 0], direction[:, 2])
-    latitude = jnp.arcsin(jnp.clip(-direction[:, 1], -1.0, 1.0))
+    latitude = jnp.arctan2(-direction[:, 1], jnp.hypot(direction[:, 0], direction[:, 2]))  # exact at a pole too
+    angle = 2 * jnp.arcsin(jnp.minimum(reach / 2, 1.0))  # a chord is 2 sin(angle / 2)
+    return jnp.stack([azimuth, latitude, angle], axis=-1)
+
+
+def _sphere_box(place, camera):
+    """Pixel box (n, 4) of the cap of `_sphere_place`; the whole row where it holds a pole."""
+    azimuth, latitude, angle = jnp.moveaxis(place, -1, 0)
     reach = jnp.sin(angle) / jnp.maximum(jnp.cos(latitude), 1e-12)  # sine of the cap's half width in azimuth
     over_pole = jnp.abs(latitude) + angle >= jnp.pi / 2
     half = jnp.where(over_pole, jnp.pi, jnp.arcsin(jnp.minimum(reach, 1.0)))
@@ -148,11 +157,12 @@ def project(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig, pr
     support = jnp.sqrt(2.0 * jnp.maximum(jax.lax.stop_gradient(log_opacity) - jnp.log(ALPHA_CUT), 0.0))
     reach = support[:, None] * jax.lax.stop_gradient(extent)
     if camera.model == EQUIRECTANGULAR:
-        angle = 2 * jnp.arcsin(jnp.minimum(reach[:, 0] / 2, 1.0))  # a chord is 2 sin(angle / 2)
-        box = _sphere_box(jax.lax.stop_gradient(mean), angle, camera)
+        place = _sphere_place(jax.lax.stop_gradient(mean), reach[:, 0])
+        box = _sphere_box(place, camera)
         on_image = jnp.ones(count, bool)
     else:
         low, high = mean - reach, mean + reach
+        place = jnp.zeros((count, 0))
         box = jax.lax.stop_gradient(jnp.concatenate([low, high], axis=-1))
         on_image = (box[:, 2] > 0) & (box[:, 3] > 0) & (box[:, 0] < camera.width) & (box[:, 1] < camera.height)
     visible = usable & in_range & on_image & (log_opacity > jnp.log(ALPHA_CUT))
@@ -160,7 +170,8 @@ def project(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig, pr
     direction = (clean.means - centre) / jnp.maximum(distance, 1e-12)[:, None]
     if probe is not None:
         mean = mean + _probe_shift(probe, points, distance, camera)
-    return Splats(mean, axes, log_opacity, rgb_from_sh(clean.sh, direction), distance, visible, box)
+    rgb = rgb_from_sh(clean.sh, direction)
+    return Splats(mean, axes, log_opacity, rgb, distance, visible, support, box, place)
 
 
 def _probe_shift(probe, points, distance, camera):

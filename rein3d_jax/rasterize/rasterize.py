@@ -14,6 +14,7 @@
 """
 
 import dataclasses
+import math
 from collections.abc import Sequence
 
 import jax
@@ -26,8 +27,8 @@ from rein3d_jax.geometry.safe import safe_divide
 from rein3d_jax.rasterize.composite import composite_chunks
 from rein3d_jax.rasterize.config import RasterizeConfig
 from rein3d_jax.rasterize.cull import gather_in_view, in_view
-from rein3d_jax.rasterize.pixels import features, from_tiles, grid, to_tiles
-from rein3d_jax.rasterize.project import project
+from rein3d_jax.rasterize.pixels import from_tiles, grid
+from rein3d_jax.rasterize.project import Splats, project
 from rein3d_jax.rasterize.tile import bin_splats, needed_pairs
 from rein3d_jax.scene import Camera, Gaussians
 
@@ -38,13 +39,13 @@ class Frame:
 
     rgb: jax.Array  # (h, w, 3) premultiplied: the scene over black
     alpha: jax.Array  # (h, w) in [0, 1)
-    distance: jax.Array  # (h, w) metres along the ray, mean over what is seen; 0 where nothing is
-    needed: jax.Array  # (3,) buffer sizes this view called for: visible, pairs, chunks
+    distance: jax.Array | None  # (h, w) metres along the ray, mean over what is seen; 0 where nothing is
+    needed: jax.Array  # (4,) buffer sizes this view called for, in the order of RasterizeConfig.buffers
     overflow: jax.Array  # () entries dropped; 0 or the picture is not the scene's
 
 
 def _rasterize(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig, probe: jax.Array | None = None):
-    if min(config.visible_capacity, config.pair_capacity, config.chunk_capacity) < 1:
+    if min(config.buffers) < 1:
         raise InputError("rasterize: buffer capacities are 0; call allocate(gaussians, cameras, config=config) first")
     if camera.model == EQUIRECTANGULAR and camera.width % config.tile:
         raise InputError(f"rasterize.tile {config.tile} does not divide the panorama's width {camera.width}")
@@ -55,12 +56,16 @@ def _rasterize(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig,
     splats = project(seen, camera, config=config, probe=probe)
     chunks = bin_splats(jax.lax.stop_gradient(splats), camera, config=config)
     needed = jnp.concatenate([jnp.sum(mask)[None], chunks.needed])
-    room = jnp.array([config.visible_capacity, config.pair_capacity, config.chunk_capacity])
-    overflow = jnp.sum(jnp.maximum(needed - room, 0))
-    tiled = composite_chunks(splats, chunks, to_tiles(features(camera), config.tile))
-    image = from_tiles(tiled, camera.height, camera.width, config.tile)
-    distance = safe_divide(image[..., 3], image[..., 4])
-    return Frame(image[..., :3], image[..., 4], distance, needed, overflow)
+    overflow = jnp.sum(jnp.maximum(needed - jnp.array(config.buffers), 0))
+    tiles = composite_chunks(splats, _values(splats, config), chunks, camera, config.tile)
+    image = from_tiles(tiles, camera, config.tile)
+    distance = safe_divide(image[..., 3], image[..., 4]) if config.distance else None
+    return Frame(image[..., :3], image[..., -1], distance, needed, overflow)
+
+
+def _values(splats: Splats, config: RasterizeConfig) -> jax.Array:
+    """(n, 3 or 4): what is composited."""
+    return jnp.concatenate([splats.rgb, splats.distance[:, None]], axis=-1) if config.distance else splats.rgb
 
 
 rasterize = jax.jit(_rasterize, static_argnames=("config",))
@@ -73,8 +78,8 @@ divide a panorama's width. Deterministic: the same inputs give the same bytes on
 
 def _measure(gaussians, camera, *, config):
     mask = in_view(gaussians, camera, config=config)
-    pairs = needed_pairs(project(gaussians, camera, config=config), camera, config)
-    return jnp.stack([jnp.sum(mask), pairs])
+    pairs = needed_pairs(project(gaussians, camera, config=config), camera, config=config)
+    return jnp.concatenate([jnp.sum(mask)[None], pairs])
 
 
 _measure = jax.jit(_measure, static_argnames=("config",))
@@ -92,27 +97,25 @@ def allocate(gaussians: Gaussians, cameras: Sequence[Camera], *, config: Rasteri
 
     Runs outside jit. An all-new camera may still overflow: `Frame.overflow` tells.
     """
-    bare = dataclasses.replace(config, visible_capacity=0, pair_capacity=0, chunk_capacity=0)
-    visible, pairs = jnp.stack([_measure(gaussians, c, config=bare) for c in cameras]).max(axis=0)
-    rows, columns = grid(cameras[0], config.tile)
+    bare = dataclasses.replace(config, visible_capacity=0, row_capacity=0, pair_capacity=0, chunk_capacity=0)
+    measured = jnp.stack([_measure(gaussians, camera, config=bare) for camera in cameras]).max(axis=0)
+    visible, rows, pairs = (int(x * slack) for x in measured)
     # Each tile wastes less than one chunk, so this bound holds whatever the spread over tiles.
-    chunks = int(pairs * slack) // config.chunk + rows * columns
-    return enlarge(config, int(visible * slack), int(pairs * slack), chunks)
+    return enlarge(config, visible, rows, pairs, pairs // config.chunk + math.prod(grid(cameras[0], config.tile)))
 
 
-def enlarge(config: RasterizeConfig, visible: int, pairs: int, chunks: int) -> RasterizeConfig:
-    """The config with buffers of at least these sizes, never smaller than it had."""
+def enlarge(config: RasterizeConfig, *needed: int) -> RasterizeConfig:
+    """The config with buffers of at least the sizes `needed`, in the order of `RasterizeConfig.buffers`, never
+    smaller than it had."""
+    visible, rows, pairs, chunks = (max(old, _bucket(new)) for old, new in zip(config.buffers, needed, strict=True))
     return dataclasses.replace(
-        config,
-        visible_capacity=max(config.visible_capacity, _bucket(visible)),
-        pair_capacity=max(config.pair_capacity, _bucket(pairs)),
-        chunk_capacity=max(config.chunk_capacity, _bucket(chunks)),
+        config, visible_capacity=visible, row_capacity=rows, pair_capacity=pairs, chunk_capacity=chunks
     )
 
 
 def render(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig) -> tuple[Frame, RasterizeConfig]:
     """`rasterize` that allocates, and allocates again on overflow. Returns the config to reuse."""
-    if config.pair_capacity == 0:
+    if min(config.buffers) == 0:
         config = allocate(gaussians, [camera], config=config)
     while True:
         frame = rasterize(gaussians, camera, config=config)

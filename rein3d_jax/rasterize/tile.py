@@ -8,21 +8,27 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from rein3d_jax.conventions import EQUIRECTANGULAR
 from rein3d_jax.rasterize.config import RasterizeConfig
 from rein3d_jax.rasterize.pixels import grid
 from rein3d_jax.rasterize.project import Splats
+from rein3d_jax.rasterize.strips import tile_columns, tile_rows
 from rein3d_jax.scene import Camera
 
 
 @struct.dataclass
 class Chunks:
-    """c chunks of l Gaussians; a tile's chunks are neighbours, front first."""
+    """c chunks of l Gaussians, the fullest first: neighbours then take the same number of steps.
+
+    `order` lists them by tile, and front first within a tile: chunk order[i] is followed by chunk order[i + 1].
+    """
 
     ids: jax.Array  # (l, c) index of a splat, n (one past the last) where the slot is empty
     tile: jax.Array  # (c,) tile of each chunk; unused chunks carry the number of tiles
-    rank: jax.Array  # (c,) place of each chunk in its tile's list, 0 first
-    needed: jax.Array  # (2,) pairs and chunks there were; more than the buffers hold were dropped
+    fill: jax.Array  # (c,) Gaussians in each chunk, 0 where unused
+    order: jax.Array  # (c,) see above
+    position: jax.Array  # (c,) the inverse of `order`
+    rank: jax.Array  # (c,) by position: place of the chunk in its tile's list, 0 first
+    needed: jax.Array  # (3,) (splat, row of tiles) pairs, (splat, tile) pairs and chunks; more were dropped
 
 
 def _argsort_packed(major: jax.Array) -> jax.Array:
@@ -34,33 +40,47 @@ def _argsort_packed(major: jax.Array) -> jax.Array:
         return (packed & 0x7FFFFFFF).astype(jnp.int32)
 
 
-def _expand(counts: jax.Array, capacity: int) -> tuple[jax.Array, jax.Array]:
-    """Owners of a ragged list: counts (n,) -> (owner, rank within owner), each (capacity,)."""
+def _expand(counts: jax.Array, capacity: int) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Owners of a ragged list: counts (n,) -> (owner, rank within owner, whether used), each (capacity,)."""
     ends = jnp.cumsum(counts)
     starts = ends - counts
     # Marking each start and taking a running maximum spreads the owners; empty owners are overwritten.
     marks = jnp.zeros(capacity, jnp.int32).at[starts].max(jnp.arange(counts.shape[0], dtype=jnp.int32), mode="drop")
     owner = jax.lax.cummax(marks)
-    return owner, jnp.arange(capacity, dtype=jnp.int32) - starts[owner]
+    rank = jnp.arange(capacity, dtype=jnp.int32) - starts[owner]
+    return owner, rank, rank < counts[owner]
 
 
-def _tile_box(splats: Splats, camera: Camera, tile: int) -> tuple[jax.Array, jax.Array]:
-    """First tile (n, 2) column, row and counts (n, 2) of each splat; columns may be negative on a sphere."""
-    rows, columns = grid(camera, tile)
-    low = jnp.floor(jnp.clip(splats.box[:, :2], -1e6, 1e6) / tile).astype(jnp.int32)
-    high = jnp.floor(jnp.clip(splats.box[:, 2:], -1e6, 1e6) / tile).astype(jnp.int32)
-    limit = jnp.array([columns, rows])
-    wraps = jnp.array([camera.model == EQUIRECTANGULAR, False])
-    first = jnp.where(wraps, low, jnp.clip(low, 0, limit))
-    last = jnp.where(wraps, high, jnp.clip(high, -1, limit - 1))
-    count = jnp.clip(last - first + 1, 0, limit)
-    return first, jnp.where(splats.visible[:, None], count, 0)
+def needed_pairs(splats: Splats, camera: Camera, *, config: RasterizeConfig) -> jax.Array:
+    """(2,) number of (splat, row of tiles) and (splat, tile) pairs: what `allocate` measures, without a buffer."""
+    first, count = tile_rows(splats, camera, config=config)
+    ids = jnp.arange(first.shape[0])
+
+    def add_row(nth, total):
+        _, columns = tile_columns(splats, ids, first + nth, camera, config=config)
+        return total + jnp.sum(jnp.where(nth < count, columns, 0))
+
+    return jnp.stack([jnp.sum(count), jax.lax.fori_loop(0, jnp.max(count, initial=0), add_row, jnp.int32(0))])
 
 
-def needed_pairs(splats: Splats, camera: Camera, config: RasterizeConfig) -> jax.Array:
-    """() number of (splat, tile) pairs: what `allocate` measures."""
-    _, count = _tile_box(splats, camera, config.tile)
-    return jnp.sum(count[:, 0] * count[:, 1])
+def _pairs(splats: Splats, camera: Camera, config: RasterizeConfig):
+    """(splat, tile) pairs, nearest splat first: splat (p,), tile (p,) (one past the last where unused), needed (2,)."""
+    rows, columns = grid(camera, config.tile)
+    first_row, row_count = tile_rows(splats, camera, config=config)
+    # Positive floats order as their bits do; unseen splats go last.
+    bits = jax.lax.bitcast_convert_type(jnp.maximum(splats.distance, 0.0), jnp.int32)
+    order = _argsort_packed(jnp.where(row_count > 0, bits, jnp.iinfo(jnp.int32).max))
+
+    owner, nth, used = _expand(row_count[order], config.row_capacity)
+    splat = order[owner]
+    row = first_row[splat] + nth
+    first_column, column_count = tile_columns(splats, splat, row, camera, config=config)
+    column_count = jnp.where(used, column_count, 0)
+
+    owner, nth, used = _expand(column_count, config.pair_capacity)
+    tile = row[owner] * columns + (first_column[owner] + nth) % columns
+    needed = jnp.stack([jnp.sum(row_count), jnp.sum(column_count)])
+    return splat[owner], jnp.where(used, tile, rows * columns), needed
 
 
 def bin_splats(splats: Splats, camera: Camera, *, config: RasterizeConfig) -> Chunks:
@@ -68,29 +88,21 @@ def bin_splats(splats: Splats, camera: Camera, *, config: RasterizeConfig) -> Ch
     total = splats.mean.shape[0]
     rows, columns = grid(camera, config.tile)
     tiles = rows * columns
-    first, count = _tile_box(splats, camera, config.tile)
-    touched = count[:, 0] * count[:, 1]
-
-    # Positive floats order as their bits do; unseen splats go last.
-    bits = jax.lax.bitcast_convert_type(jnp.maximum(splats.distance, 0.0), jnp.int32)
-    order = _argsort_packed(jnp.where(touched > 0, bits, jnp.iinfo(jnp.int32).max))
-
-    owner, rank = _expand(touched[order], config.pair_capacity)
-    splat = order[owner]
-    used = rank < touched[splat]
-    column = (first[splat, 0] + rank % jnp.maximum(count[splat, 0], 1)) % columns
-    row = first[splat, 1] + rank // jnp.maximum(count[splat, 0], 1)
-    pair_tile = jnp.where(used, row * columns + column, tiles)
-    by_tile = _argsort_packed(pair_tile)
-    starts = jnp.searchsorted(pair_tile[by_tile], jnp.arange(tiles + 1)).astype(jnp.int32)
+    splat, tile, needed = _pairs(splats, camera, config)
+    by_tile = _argsort_packed(tile)
+    starts = jnp.searchsorted(tile[by_tile], jnp.arange(tiles + 1)).astype(jnp.int32)
 
     length = starts[1:] - starts[:-1]
     chunks = -(-length // config.chunk)
-    tile_of, nth = _expand(chunks, config.chunk_capacity)
-    slot = starts[tile_of] + nth * config.chunk + jnp.arange(config.chunk, dtype=jnp.int32)[:, None]
-    filled = (slot < starts[tile_of + 1]) & (nth < chunks[tile_of])
-    ids = jnp.where(filled, splat[by_tile[jnp.minimum(slot, config.pair_capacity - 1)]], total)
+    tile_of, rank, used = _expand(chunks, config.chunk_capacity)
+    first = starts[tile_of] + rank * config.chunk
+    fill = jnp.where(used, jnp.minimum(starts[tile_of + 1] - first, config.chunk), 0)
 
-    needed = jnp.stack([jnp.sum(touched), jnp.sum(chunks)])
-    used = nth < chunks[tile_of]
-    return Chunks(ids, jnp.where(used, tile_of, tiles), jnp.where(used, nth, 0), needed)
+    position = _argsort_packed(config.chunk - fill)
+    order = _argsort_packed(position)
+    fill, nth = fill[position], jnp.arange(config.chunk, dtype=jnp.int32)[:, None]
+    slot = jnp.minimum(first[position] + nth, config.pair_capacity - 1)
+    ids = jnp.where(nth < fill, splat[by_tile][slot], total)
+    needed = jnp.concatenate([needed, jnp.sum(chunks)[None]])
+    tile = jnp.where(used, tile_of, tiles)[position]
+    return Chunks(ids, tile, fill, order, position, jnp.where(used, rank, 0), needed)

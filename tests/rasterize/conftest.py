@@ -16,7 +16,7 @@ from rein3d_jax.scene import Camera, Gaussians
 
 COUNT = 60
 # Room for every Gaussian in each of at most 9 tiles; chunks of 4, so that a tile has several.
-ROOMY = RasterizeConfig(chunk=4, visible_capacity=64, pair_capacity=576, chunk_capacity=160)
+ROOMY = RasterizeConfig(chunk=4, visible_capacity=64, row_capacity=192, pair_capacity=576, chunk_capacity=160)
 
 
 def make_scene(seed: int = 0, count: int = COUNT) -> Gaussians:

@@ -10,7 +10,7 @@ from rein3d_jax.conventions import EQUIRECTANGULAR, PINHOLE
 from rein3d_jax.errors import InputError
 from rein3d_jax.rasterize import RasterizeConfig, allocate, rasterize, render
 
-BUFFERS = ("visible_capacity", "pair_capacity", "chunk_capacity")
+BUFFERS = ("visible_capacity", "row_capacity", "pair_capacity", "chunk_capacity")
 
 
 def fitted(config: RasterizeConfig, needed) -> RasterizeConfig:
@@ -22,7 +22,7 @@ def test_buffers_that_just_fit_give_the_roomy_picture(scene_of, camera_of, roomy
     frame = rasterize(scene_of(), camera, config=roomy)
     tight = rasterize(scene_of(), camera, config=fitted(roomy, frame.needed))
     assert int(frame.overflow) == int(tight.overflow) == 0
-    np.testing.assert_allclose(tight.rgb, frame.rgb, atol=1e-6)  # the same sums, perhaps vectorised otherwise
+    np.testing.assert_allclose(tight.rgb, frame.rgb, atol=5e-6)  # the same sums, vectorised otherwise
 
 
 @pytest.mark.parametrize("buffer", BUFFERS)
@@ -33,8 +33,8 @@ def test_one_too_few_is_counted_and_render_makes_room(buffer, scene_of, camera_o
     assert int(rasterize(scene_of(), camera, config=short).overflow) > 0
     again, grown = render(scene_of(), camera, config=short)
     assert int(again.overflow) == 0 and all(getattr(grown, name) >= getattr(short, name) for name in BUFFERS)
-    np.testing.assert_allclose(again.rgb, frame.rgb, atol=1e-6)  # as above
-    np.testing.assert_allclose(again.distance, frame.distance, atol=1e-5)  # metres up to 4, divided by alpha
+    np.testing.assert_allclose(again.rgb, frame.rgb, atol=5e-6)  # as above
+    np.testing.assert_allclose(again.distance, frame.distance, atol=3e-5)  # metres up to 4, divided by alpha
 
 
 def test_allocate_measures_enough_for_its_cameras(scene_of, camera_of) -> None:

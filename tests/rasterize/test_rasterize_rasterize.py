@@ -23,13 +23,14 @@ def test_value_and_gradient_equal_the_oracle(model, antialias, scene_of, camera_
     image, gradient = fast(scene_of(), camera_of(model), config=config)
     oracle, expected = slow(scene_of(), camera_of(model), config=config)
     for actual, value in zip(image, oracle, strict=True):
-        # float32 sums of at most 60 terms of order 1, associated otherwise; a lost splat would show at least 4e-3.
-        np.testing.assert_allclose(actual, value, atol=3e-6)
+        # float32: log alpha is a polynomial about the tile's anchor here, a sum of terms up to 50 that rounds to 3e-6,
+        # and distances reach 4 m; a lost splat would show at least 4e-3.
+        np.testing.assert_allclose(actual, value, atol=2e-5)
     for name, value in expected.items():
         scale = float(jnp.abs(value).max())
         assert scale > 0.1, name  # the loss does depend on it
         # The same, summed over 512 pixels with mixed signs, which cancel: relative to the leaf's largest.
-        np.testing.assert_allclose(gradient[name], value, atol=5e-6 * scale, err_msg=name)
+        np.testing.assert_allclose(gradient[name], value, atol=2e-5 * scale, err_msg=name)
 
 
 @pytest.mark.parametrize("columns", [5, 16])  # no multiple of a tile, and half a turn
@@ -72,7 +73,7 @@ def test_one_vmap_over_cameras_equals_calls_one_by_one(scene_of, camera_of, room
     together = jax.vmap(view)(poses)
     for i, pose in enumerate(poses):
         for a, b in zip(jax.tree.leaves(together), jax.tree.leaves(view(pose)), strict=True):
-            np.testing.assert_allclose(a[i], b, atol=1e-5)  # the same float32 sums, vectorised otherwise; metres to 4
+            np.testing.assert_allclose(a[i], b, atol=3e-5)  # the same float32 sums, vectorised otherwise; metres to 4
 
 
 @MODELS

@@ -16,7 +16,7 @@ from rein3d_jax.scene import Gaussians
 
 COUNT, SPARE, SIZE, VIEWS = 40, 20, 16, 12
 # Roomier than `refine` would ask for, so that it keeps these buffers and the tests share one compiled step.
-RASTER = RasterizeConfig(visible_capacity=96, pair_capacity=512, chunk_capacity=128)
+RASTER = RasterizeConfig(visible_capacity=96, row_capacity=256, pair_capacity=512, chunk_capacity=128)
 CONFIG = RefineConfig(
     steps=10, batch=2, crop=SIZE, test_every=4, evaluate_every=5, sh_degree=1, sh_degree_every=4, finest=0.0,
     densify_start=4, densify_every=4, densify_share=1.0, reset_every=100,
