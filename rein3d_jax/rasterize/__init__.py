@@ -1,6 +1,16 @@
 """Gaussians + cameras -> colour, alpha, distance: project, tile, composite; reference.py is the slow dense oracle."""
 
 from rein3d_jax.rasterize.config import RasterizeConfig
+from rein3d_jax.rasterize.contribution import accumulated_weight, median_distance
 from rein3d_jax.rasterize.rasterize import Frame, allocate, enlarge, rasterize, render
 
-__all__ = ["Frame", "RasterizeConfig", "allocate", "enlarge", "rasterize", "render"]
+__all__ = [
+    "Frame",
+    "RasterizeConfig",
+    "accumulated_weight",
+    "allocate",
+    "enlarge",
+    "median_distance",
+    "rasterize",
+    "render",
+]

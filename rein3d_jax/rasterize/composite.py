@@ -211,3 +211,30 @@ composite.defvjp(_composite_forward, _composite_backward)
 def composite_chunks(splats: Splats, values: jax.Array, chunks: Chunks, camera: Camera, tile: int) -> jax.Array:
     """Splats with their values (n, v) and chunks -> (tiles, v + 1, tile^2): premultiplied values and, last, alpha."""
     return composite(splat_table(splats, values), *tile_pixels(camera, tile), chunks)
+
+
+def median_of_chunks(splats: Splats, chunks: Chunks, camera: Camera, tile: int) -> jax.Array:
+    """(tiles, tile^2) metres to the splat at which transmittance falls to one half; 0 where it never does."""
+    table = splat_table(splats, splats.distance[:, None])
+    anchors, pixels = tile_pixels(camera, tile)
+    before = _before(_chunk_layers(table, anchors, pixels, chunks)[:, -1], chunks)
+    blocks = _Blocks(chunks, anchors, pixels)
+
+    def median_block(index, medians):
+        near, planes = blocks.by_tile(anchors, index), blocks.planes(index)
+
+        def turn(number, state):
+            through, median = state
+            of_terms, (distance,) = _unpack(blocks.rows(table, index, number), near)
+            for u in range(blocks.turn):
+                behind = through * (1.0 - _alpha([c[u] for c in of_terms], planes)[1])
+                median = jnp.where((through > 0.5) & (behind <= 0.5), distance[u][:, None], median)
+                through = behind
+            return through, median
+
+        start = blocks.part(before, index)
+        median = jax.lax.fori_loop(0, blocks.turns(index), turn, (start, jnp.zeros_like(start)))[1]
+        return jax.lax.dynamic_update_slice_in_dim(medians, median, index * blocks.block, 0)
+
+    medians = jax.lax.fori_loop(0, blocks.count, median_block, jnp.zeros_like(before))
+    return jax.ops.segment_sum(medians, chunks.tile, num_segments=anchors.shape[0] + 1)[:-1]  # one chunk has it

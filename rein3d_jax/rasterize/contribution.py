@@ -1,0 +1,50 @@
+"""What each Gaussian gives to a picture, and where along a ray the picture's middle lies."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+
+from rein3d_jax.rasterize.composite import composite_chunks, median_of_chunks
+from rein3d_jax.rasterize.config import RasterizeConfig
+from rein3d_jax.rasterize.cull import gather_in_view, in_view
+from rein3d_jax.rasterize.pixels import from_tiles
+from rein3d_jax.rasterize.project import project
+from rein3d_jax.rasterize.tile import bin_splats
+from rein3d_jax.scene import Camera, Gaussians
+
+
+def _listed(gaussians, camera, config):
+    """Splats, their chunks, and the Gaussian (n where none) of each splat."""
+    mask = in_view(gaussians, camera, config=config)
+    seen, ids = gather_in_view(gaussians, mask, config.visible_capacity)
+    splats = project(seen, camera, config=config)
+    return splats, bin_splats(splats, camera, config=config), ids
+
+
+@partial(jax.jit, static_argnames=("config",))
+def accumulated_weight(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig) -> jax.Array:
+    """(n,) sum over pixels of w_i = alpha_i T_i, in pixels: what a Gaussian adds to this view; over all Gaussians they
+    sum to the picture's alpha. `config` is `allocate`'s, for a view that does not overflow.
+
+    The picture of a value that is v_i on Gaussian i is sum_i w_i v_i: its gradient by v is the weight.
+    """
+    splats, chunks, ids = _listed(gaussians, camera, config)
+
+    def painted(values):
+        tiles = composite_chunks(splats, values[:, None], chunks, camera, config.tile)
+        return jnp.sum(from_tiles(tiles, camera, config.tile)[..., 0])
+
+    weight = jax.grad(painted)(jnp.zeros(ids.shape))
+    return jnp.zeros(gaussians.alive.shape).at[ids].add(weight, mode="drop")
+
+
+@partial(jax.jit, static_argnames=("config",))
+def median_distance(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig) -> jax.Array:
+    """(h, w) metres along the ray to the Gaussian at which transmittance falls to one half; 0 where it never does.
+
+    Between two surfaces the mean distance lies in empty space, the median on one of them. Not differentiable.
+    """
+    splats, chunks, _ = _listed(gaussians, camera, config)
+    tiles = median_of_chunks(splats, chunks, camera, config.tile)
+    return from_tiles(tiles[:, None], camera, config.tile)[..., 0]
