@@ -25,6 +25,7 @@ from rein3d_jax.scene import Camera, Gaussians
 # alpha at the antipode, exp(-2 / 0.5^2) = 3e-4, lies under the 1/255 cut. A larger Gaussian is culled, as
 # one at the near plane is.
 MAX_ANGULAR_SIGMA = 0.5
+MAX_RADIAL_SIGMA = 0.3  # of the distance; see _curved
 
 
 @struct.dataclass
@@ -92,6 +93,26 @@ def _tangent_frame(direction):
     return jnp.stack([first, jnp.stack([b, sign + y * y * a, -y], axis=-1)], axis=-2)
 
 
+def _curved(rows, radial):
+    """Footprint (n, 2, 3) over the tangent plane, per unit distance, to second order in sigma / distance.
+
+    Rays to a Gaussian's points have second moments C + 3 (C s^2 + 2 c c^T) - tr(C) C - 2 C^2, C = rows rows^T,
+    c = rows radial, s = |radial|: what lies nearer looks wider, and the sphere bends away. What is drawn (the chord's
+    Gaussian) has Q - tr(Q) Q / 2, so Q = C + 3 (C s^2 + 2 c c^T) - tr(C) C / 2 - 2 C^2, here as M rows N with
+    M = 1 - tr(C) / 4 - C, written (1 + tr(C) / 4 + C)^-1 to stay positive, and N = (1 + 3 s^2 / 2) (1 + 3 r r^T).
+    At sigma / distance 0.3 the error of moments falls from 13 % to under 5 % (`python -m benchmarks poles`).
+    """
+    # The series is for Gaussians that keep clear of the camera.
+    radial = radial * (MAX_RADIAL_SIGMA / jnp.maximum(safe_norm(radial, keepdims=True), MAX_RADIAL_SIGMA))
+    rows = rows + 3.0 * jnp.sum(rows * radial[:, None], axis=-1, keepdims=True) * radial[:, None]
+    rows = rows * (1.0 + 1.5 * jnp.sum(radial**2, axis=-1))[:, None, None]
+    xx, xy, yy = (jnp.sum(rows[:, i] * rows[:, j], axis=-1) for i, j in ((0, 0), (0, 1), (1, 1)))
+    own = 1.0 + (xx + yy) / 4.0
+    first, second = own + xx, own + yy
+    inverse = jnp.stack([jnp.stack([second, -xy], -1), jnp.stack([-xy, first], -1)], -2)
+    return jnp.einsum("nij,njk->nik", inverse, rows, precision="highest") / (first * second - xy * xy)[:, None, None]
+
+
 def _equirectangular(points, spread, distance, camera, config):
     """As `_pinhole`, with features in unit rays; the extents are one isotropic angle (n, 1)."""
     in_range = (distance > config.near) & (distance < config.far)
@@ -99,6 +120,8 @@ def _equirectangular(points, spread, distance, camera, config):
     direction = jnp.where(in_range[:, None], points, jnp.array([0.0, 0.0, 1.0])) / safe_distance[:, None]
     frame = _tangent_frame(direction)
     rows = jnp.einsum("nij,njk->nik", frame, spread, precision="highest") / safe_distance[:, None, None]
+    radial = jnp.einsum("ni,nij->nj", direction, spread, precision="highest") / safe_distance[:, None]
+    rows = _curved(rows, radial)
     # The filter is round on the sphere, with the pitch of a row: columns crowd at the poles, detail does not.
     pixel = (jnp.pi / camera.height) ** 2
     covariance, factor = _filtered(rows, config.filter_variance * pixel, config.antialias)
