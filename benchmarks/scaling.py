@@ -17,9 +17,9 @@ from rein3d_jax.io.atomic import write_text
 from rein3d_jax.rasterize import allocate, rasterize
 from rein3d_jax.scene import Gaussians
 
-COUNTS = (10_000, 32_000, 100_000, 320_000, 1_000_000)
-WIDTHS = (128, 228, 404, 720, 1280)  # pictures of 12k to 1.2M pixels
-ROUNDS = 9
+COUNTS = (30_000, 100_000, 300_000, 1_000_000, 3_000_000)
+WIDTHS = (240, 424, 760, 1352, 2400)  # pictures of 43k to 4.3M pixels
+ROUNDS = 7
 
 
 def _seconds(scene, camera) -> tuple[float, int]:
@@ -49,8 +49,8 @@ def by_gaussians() -> dict:
 
 
 def by_pixels() -> dict:
-    """The same 100,000 Gaussians, ever more pixels: a splat covers its share of the picture at every size."""
-    rows = [_seconds(*_room(100_000, width, 0.015)) for width in WIDTHS]
+    """Ever more pixels, with a Gaussian in the scene for every 3 of them and a splat's size in pixels the same."""
+    rows = [_seconds(*_room(width * (width * 3 // 4) // 3, width, 0.015 * 640 / width)) for width in WIDTHS]
     return _report("pixels", [width * (width * 3 // 4) for width in WIDTHS], rows)
 
 

@@ -7,19 +7,9 @@ import jax.numpy as jnp
 
 from rein3d_jax.rasterize.composite import composite_chunks, median_of_chunks
 from rein3d_jax.rasterize.config import RasterizeConfig
-from rein3d_jax.rasterize.cull import gather_in_view, in_view
+from rein3d_jax.rasterize.listing import list_splats
 from rein3d_jax.rasterize.pixels import from_tiles
-from rein3d_jax.rasterize.project import project
-from rein3d_jax.rasterize.tile import bin_splats
 from rein3d_jax.scene import Camera, Gaussians
-
-
-def _listed(gaussians, camera, config):
-    """Splats, their chunks, and the Gaussian (n where none) of each splat."""
-    mask = in_view(gaussians, camera, config=config)
-    seen, ids = gather_in_view(gaussians, mask, config.visible_capacity)
-    splats = project(seen, camera, config=config)
-    return splats, bin_splats(splats, camera, config=config), ids
 
 
 @partial(jax.jit, static_argnames=("config",))
@@ -29,7 +19,7 @@ def accumulated_weight(gaussians: Gaussians, camera: Camera, *, config: Rasteriz
 
     The picture of a value that is v_i on Gaussian i is sum_i w_i v_i: its gradient by v is the weight.
     """
-    splats, chunks, ids = _listed(gaussians, camera, config)
+    splats, chunks, ids, _ = list_splats(gaussians, camera, config=config)
 
     def painted(values):
         tiles = composite_chunks(splats, values[:, None], chunks, camera, config.tile)
@@ -45,6 +35,6 @@ def median_distance(gaussians: Gaussians, camera: Camera, *, config: RasterizeCo
 
     Between two surfaces the mean distance lies in empty space, the median on one of them. Not differentiable.
     """
-    splats, chunks, _ = _listed(gaussians, camera, config)
+    splats, chunks, _, _ = list_splats(gaussians, camera, config=config)
     tiles = median_of_chunks(splats, chunks, camera, config.tile)
     return from_tiles(tiles[:, None], camera, config.tile)[..., 0]

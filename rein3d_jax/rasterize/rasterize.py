@@ -26,10 +26,11 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.safe import safe_divide
 from rein3d_jax.rasterize.composite import composite_chunks
 from rein3d_jax.rasterize.config import RasterizeConfig
-from rein3d_jax.rasterize.cull import gather_in_view, in_view
+from rein3d_jax.rasterize.cull import in_view
+from rein3d_jax.rasterize.listing import list_splats
 from rein3d_jax.rasterize.pixels import from_tiles, grid
 from rein3d_jax.rasterize.project import Splats, project
-from rein3d_jax.rasterize.tile import bin_splats, needed_pairs
+from rein3d_jax.rasterize.tile import needed_pairs
 from rein3d_jax.scene import Camera, Gaussians
 
 
@@ -49,13 +50,7 @@ def _rasterize(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig,
         raise InputError("rasterize: buffer capacities are 0; call allocate(gaussians, cameras, config=config) first")
     if camera.model == EQUIRECTANGULAR and camera.width % config.tile:
         raise InputError(f"rasterize.tile {config.tile} does not divide the panorama's width {camera.width}")
-    mask = in_view(jax.lax.stop_gradient(gaussians), camera, config=config)
-    seen, ids = gather_in_view(gaussians, mask, config.visible_capacity)
-    if probe is not None:
-        probe = jnp.take(probe, ids, axis=0, mode="clip")
-    splats = project(seen, camera, config=config, probe=probe)
-    chunks = bin_splats(jax.lax.stop_gradient(splats), camera, config=config)
-    needed = jnp.concatenate([jnp.sum(mask)[None], chunks.needed])
+    splats, chunks, _, needed = list_splats(gaussians, camera, config=config, probe=probe)
     overflow = jnp.sum(jnp.maximum(needed - jnp.array(config.buffers), 0))
     tiles = composite_chunks(splats, _values(splats, config), chunks, camera, config.tile)
     image = from_tiles(tiles, camera, config.tile)

@@ -1,0 +1,26 @@
+"""Gaussians + camera -> splats and the lists of them that each tile composites: all that precedes compositing."""
+
+import jax
+import jax.numpy as jnp
+
+from rein3d_jax.rasterize.config import RasterizeConfig
+from rein3d_jax.rasterize.cull import gather_in_view, in_view
+from rein3d_jax.rasterize.project import Splats, project
+from rein3d_jax.rasterize.tile import Chunks, bin_splats
+from rein3d_jax.scene import Camera, Gaussians
+
+
+def list_splats(
+    gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig, probe: jax.Array | None = None
+) -> tuple[Splats, Chunks, jax.Array, jax.Array]:
+    """Splats (v,), their chunks, the Gaussian of each splat (v,) (n where none), and the buffer sizes needed (4,).
+
+    `probe` (n, 2) is `project`'s, one row a Gaussian.
+    """
+    mask = in_view(jax.lax.stop_gradient(gaussians), camera, config=config)
+    seen, ids = gather_in_view(gaussians, mask, config.visible_capacity)
+    if probe is not None:
+        probe = jnp.take(probe, ids, axis=0, mode="clip")
+    splats = project(seen, camera, config=config, probe=probe)
+    chunks = bin_splats(jax.lax.stop_gradient(splats), camera, config=config)
+    return splats, chunks, ids, jnp.concatenate([jnp.sum(mask)[None], chunks.needed])
