@@ -36,6 +36,13 @@ def in_view(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig) ->
     return gaussians.alive & inside & (z > config.near) & (z < config.far)
 
 
+def at_least_one(gaussians: Gaussians) -> Gaussians:
+    """The same, or for a scene of no Gaussians a dead one: buffers of no size have no shape to work on."""
+    if gaussians.alive.shape[0]:
+        return gaussians
+    return jax.tree.map(lambda x: jnp.zeros((1, *x.shape[1:]), x.dtype), gaussians)
+
+
 def gather_in_view(gaussians: Gaussians, mask: jax.Array, capacity: int) -> tuple[Gaussians, jax.Array]:
     """The Gaussians of `mask` (n,) in a buffer of `capacity`, and their indices (n where empty)."""
     count = mask.shape[0]

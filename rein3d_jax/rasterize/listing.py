@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from rein3d_jax.rasterize.config import RasterizeConfig
-from rein3d_jax.rasterize.cull import gather_in_view, in_view
+from rein3d_jax.rasterize.cull import at_least_one, gather_in_view, in_view
 from rein3d_jax.rasterize.project import Splats, project
 from rein3d_jax.rasterize.tile import Chunks, bin_splats
 from rein3d_jax.scene import Camera, Gaussians
@@ -17,10 +17,11 @@ def list_splats(
 
     `probe` (n, 2) is `project`'s, one row a Gaussian.
     """
+    gaussians = at_least_one(gaussians)
     mask = in_view(jax.lax.stop_gradient(gaussians), camera, config=config)
     seen, ids = gather_in_view(gaussians, mask, config.visible_capacity)
     if probe is not None:
-        probe = jnp.take(probe, ids, axis=0, mode="clip")
+        probe = jnp.take(probe, ids, axis=0, mode="fill", fill_value=0.0)
     splats = project(seen, camera, config=config, probe=probe)
     chunks = bin_splats(jax.lax.stop_gradient(splats), camera, config=config)
     return splats, chunks, ids, jnp.concatenate([jnp.sum(mask)[None], chunks.needed])

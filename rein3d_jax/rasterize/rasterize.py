@@ -26,7 +26,7 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.safe import safe_divide
 from rein3d_jax.rasterize.composite import composite_chunks
 from rein3d_jax.rasterize.config import RasterizeConfig
-from rein3d_jax.rasterize.cull import in_view
+from rein3d_jax.rasterize.cull import at_least_one, in_view
 from rein3d_jax.rasterize.listing import list_splats
 from rein3d_jax.rasterize.pixels import from_tiles, grid
 from rein3d_jax.rasterize.project import Splats, project
@@ -72,6 +72,7 @@ divide a panorama's width. Deterministic: the same inputs give the same bytes on
 
 
 def _measure(gaussians, camera, *, config):
+    gaussians = at_least_one(gaussians)
     mask = in_view(gaussians, camera, config=config)
     pairs = needed_pairs(project(gaussians, camera, config=config), camera, config=config)
     return jnp.concatenate([jnp.sum(mask)[None], pairs])

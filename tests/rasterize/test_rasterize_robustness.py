@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rein3d_jax.conventions import EQUIRECTANGULAR, PINHOLE
+from rein3d_jax.rasterize import RasterizeConfig, accumulated_weight, rasterize, render
 
 
 def hostile(scene, camera, seed: int):
@@ -40,3 +41,17 @@ def test_outputs_and_gradients_are_finite(model, scene_of, camera_of, roomy, fas
             assert np.all(np.isfinite(leaf)), (seed, jax.tree_util.keystr(path))
         seen += float(image[1].mean())
     assert seen / 12 > 0.01  # and something is drawn
+
+
+@pytest.mark.parametrize("model", [PINHOLE, EQUIRECTANGULAR])
+def test_scenes_of_no_and_of_one_gaussian(model, scene_of, camera_of) -> None:
+    camera = camera_of(model)
+    for count in (0, 1):
+        scene = jax.tree.map(lambda x: x[:count], scene_of())  # noqa: B023
+        frame, config = render(scene, camera, config=RasterizeConfig())
+        gradient = jax.grad(lambda x: jnp.sum(rasterize(x, camera, config=config).rgb), allow_int=True)(scene)  # noqa: B023
+        weight = accumulated_weight(scene, camera, config=config)
+        assert weight.shape == gradient.opacity_logits.shape == (count,)
+        # In float32, summed over the picture in another order.
+        np.testing.assert_allclose(float(weight.sum()), float(frame.alpha.sum()), rtol=1e-5)
+        assert (count == 0) == (float(frame.alpha.sum()) == 0)
