@@ -45,3 +45,11 @@ class Video:
     alpha: jax.Array  # (t, h, w) 1 = observed
     distance: jax.Array  # (t, h, w) metres, 0 where alpha is 0
     world_from_camera: jax.Array  # (t, 4, 4)
+
+
+@struct.dataclass
+class Pair:
+    """What a restorer learns from: a clip as the room is, and as its first frame, lifted, shows it (paper Sec. 3)."""
+
+    clean: Video  # alpha 1 everywhere; frame 0, the first panorama, is the context anchor
+    degraded: Video  # same poses; frame 0 stands at the world's origin
