@@ -4,9 +4,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from skimage.data import astronaut
+from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
 from rein3d_jax.evaluate.coverage import coverage
-from rein3d_jax.evaluate.metrics import psnr, ssim, ws_psnr
+from rein3d_jax.evaluate.metrics import psnr, ssim, ws_psnr, ws_ssim
 
 HEIGHT, WIDTH = 16, 32
 
@@ -42,9 +44,50 @@ def test_ssim_is_its_definition(pair):
     np.testing.assert_allclose(ssim(*pair), slow_ssim(*pair), atol=1e-5)
 
 
+def test_psnr_and_ssim_are_those_of_scikit_image():
+    photo = astronaut()[:192, 128:320] / 255.0
+    noisy = np.clip(photo + np.random.default_rng(1).normal(0, 0.05, photo.shape), 0, 1)
+    settings = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False, "channel_axis": -1}
+    # It averages over the places where the window fits, too; float64 there, float32 here.
+    expected = structural_similarity(photo, noisy, data_range=1.0, **settings)
+    np.testing.assert_allclose(ssim(noisy, photo), expected, atol=1e-5)
+    np.testing.assert_allclose(psnr(noisy, photo), peak_signal_noise_ratio(photo, noisy, data_range=1.0), atol=1e-4)
+
+
+def test_ws_ssim_is_its_definition(pair):
+    """The slow SSIM of the 11 x 11 pixels that lie round each pixel on the sphere, weighted by cos(latitude)."""
+    rows, columns = np.mgrid[-5:6, -5:6]
+    total = weight = 0.0
+    for v, u in np.ndindex(HEIGHT, WIDTH):
+        row, column = rows + v, columns + u
+        beyond = (row < 0) | (row >= HEIGHT)  # over the pole: the same distance this side of it, half way round
+        row = np.where(row < 0, -1 - row, np.where(row >= HEIGHT, 2 * HEIGHT - 1 - row, row))
+        column = (column + beyond * WIDTH // 2) % WIDTH
+        share = np.cos(np.pi * (0.5 - (v + 0.5) / HEIGHT))
+        total += share * slow_ssim(*(image[row, column] for image in pair))
+        weight += share
+    np.testing.assert_allclose(ws_ssim(*pair), total / weight, atol=1e-5)  # as above
+
+
+def test_turning_both_panoramas_changes_nothing():
+    rng = np.random.default_rng(2)
+    image = rng.uniform(size=(128, 256, 3)).astype(np.float32)
+    noisy = np.clip(image + rng.normal(0, 0.1, image.shape), 0, 1).astype(np.float32)
+    for metric in (ws_psnr, ws_ssim):
+        turned = metric(np.roll(noisy, 100, axis=1), np.roll(image, 100, axis=1))
+        np.testing.assert_allclose(turned, metric(noisy, image), atol=1e-4)  # the same sums in another order
+
+
+def test_the_weights_of_rows_are_their_area():
+    """cos(latitude), summed, is the sphere's area to second order in the height of a pixel."""
+    rows = np.cos(np.pi * (0.5 - (np.arange(128) + 0.5) / 128))
+    np.testing.assert_allclose(rows.sum() * np.pi / 128 * 2 * np.pi, 4 * np.pi, rtol=(np.pi / 128) ** 2 / 24 * 1.01)
+
+
 def test_equal_images_are_perfect(pair):
     image, _ = pair
     np.testing.assert_allclose(ssim(image, image), 1.0, atol=1e-6)  # rounding of a quotient of equal sums
+    np.testing.assert_allclose(ws_ssim(image, image), 1.0, atol=1e-6)
     assert psnr(image, image) == ws_psnr(image, image) == jnp.inf
 
 
@@ -76,7 +119,7 @@ def test_psnr_counts_only_the_masked_pixels(pair):
 def test_each_image_of_a_batch_has_its_own_value(pair):
     image, noisy = pair
     batch = np.stack([noisy, noisy[::-1]]), np.stack([image, image])
-    for metric in (psnr, ws_psnr, ssim):
+    for metric in (psnr, ws_psnr, ssim, ws_ssim):
         alone = [metric(*both) for both in zip(*batch, strict=True)]
         np.testing.assert_allclose(metric(*batch), alone, rtol=1e-5)  # float32 sums in another order
 
