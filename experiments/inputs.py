@@ -2,20 +2,19 @@
 
 import dataclasses
 import hashlib
-import json
 from pathlib import Path
 
 import jax.numpy as jnp
-import numpy as np
 
-from rein3d_jax.conventions import PINHOLE
 from rein3d_jax.depth.complete import CompleteConfig, complete_distance
 from rein3d_jax.depth.room_shell import RoomShellConfig, fit_room_shell, shell_distance
 from rein3d_jax.errors import InputError
+from rein3d_jax.io import traced_room
 from rein3d_jax.io.distance import read_distance
 from rein3d_jax.io.image import read_rgb, resize_panorama
 from rein3d_jax.io.input_file import require_file
-from rein3d_jax.scene import Camera, Panorama
+from rein3d_jax.io.traced_room import View
+from rein3d_jax.scene import Panorama
 
 SAMPLES = Path(__file__).parent / "samples"
 GIVEN, FITTED = "given", "room-shell estimate"
@@ -33,15 +32,6 @@ class InputConfig:
     def __post_init__(self):
         if self.height % 32 or not 64 <= self.height <= 4096:
             raise InputError(f"input.height {self.height} must be a multiple of 32 from 64 to 4096")
-
-
-@dataclasses.dataclass(frozen=True)
-class View:
-    """A picture taken in the room, and the camera that took it."""
-
-    name: str
-    rgb: np.ndarray  # (h, w, 3) sRGB
-    camera: Camera
 
 
 def resolve(path: str) -> Path:
@@ -67,28 +57,7 @@ def read_panorama(config: InputConfig, depth: CompleteConfig, shell: RoomShellCo
 
 def read_views(config: InputConfig) -> list[View]:
     """The views of a scene.json as ../shared/rooms has them; [] where the config names none."""
-    if config.views is None:
-        return []
-    path = resolve(config.views)
-    require_file(path)
-    try:
-        return [_view(path.parent, entry) for entry in json.loads(path.read_text())["views"]]
-    except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: not a list of views ({error!r}); it needs rgb, c2w, fx, fy, cx, cy each") from error
-
-
-def _view(folder: Path, entry: dict) -> View:
-    pose = np.asarray(entry["c2w"], np.float32)
-    numbers = np.asarray([entry[name] for name in ("fx", "fy", "cx", "cy")], np.float32)
-    if pose.shape != (4, 4) or not np.isfinite(pose).all() or not np.isfinite(numbers).all():
-        raise ValueError("c2w must be a finite 4x4 matrix")
-    require_file(folder / entry["rgb"])
-    rgb = read_rgb(folder / entry["rgb"], panorama=False)
-    height, width = rgb.shape[:2]
-    camera = Camera(jnp.asarray(pose), jnp.asarray(numbers[:2]), jnp.asarray(numbers[2:]), PINHOLE, width, height)
-    return View(entry["rgb"], rgb, camera)
+    return [] if config.views is None else list(traced_room.read_views(resolve(config.views), anywhere=True))
 
 
 def fingerprint(config: InputConfig) -> str:
