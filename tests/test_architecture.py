@@ -27,7 +27,12 @@ HOMES = {
     "cv2": ("rein3d_jax/io/", "rein3d_jax/restore/fills.py"),
     "OpenImageIO": ("rein3d_jax/io/",),
     "av": ("rein3d_jax/io/video.py",),
-    "orbax": ("rein3d_jax/io/checkpoint.py",),
+    "orbax": ("rein3d_jax/io/checkpoint.py", "rein3d_jax/io/training_checkpoint.py"),
+    "trimesh": ("rein3d_jax/io/mesh_file.py",),
+    "PIL": ("rein3d_jax/io/mesh_file.py", "rein3d_jax/io/gltf_header.py"),  # trimesh's pictures
+    "safetensors": ("rein3d_jax/io/safetensors_folder.py",),
+    "tensorboardX": ("rein3d_jax/io/training_log.py",),
+    "embreex": ("rein3d_jax/io/ray_caster.py",),
     "rich": ("experiments/",),
 }
 
