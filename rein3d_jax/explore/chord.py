@@ -28,7 +28,8 @@ def _longest_chord(
     width = distance.shape[1]
     assert width % 2 == 0, "the direction opposite to a column's must be a column's"
     directions = azimuths(width)
-    ahead = travel(safe_distances(band_profile(distance, valid, config=config), directions, config=config), config=config)
+    raw = band_profile(distance, valid, config=config)
+    ahead = travel(safe_distances(raw, directions, config=config), config=config)
     behind = jnp.roll(ahead, width // 2) if through else jnp.zeros_like(ahead)
     best = jnp.argmax(ahead + behind)
     direction = horizontal_direction(directions[best])
