@@ -22,6 +22,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from experiments import inputs, story
+from experiments.compile_cache import use_compile_cache
 from experiments.config import dump_config, load_config
 from experiments.flythrough import FilmConfig, flythrough
 from experiments.inputs import InputConfig, read_panorama, read_views
@@ -65,8 +66,7 @@ class ReconstructConfig(Stages):
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where the input is at fault."""
     options = _parser().parse_args(arguments)
-    if not jax.config.jax_compilation_cache_dir:  # a second run then starts a minute sooner
-        jax.config.update("jax_compilation_cache_dir", str(Path.home() / ".cache" / "rein3d_jax"))
+    use_compile_cache()
     try:
         config = load_config(ReconstructConfig, options.config, _overrides(options))
         reconstruct(config, resume=options.resume)
