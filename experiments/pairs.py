@@ -82,28 +82,27 @@ def room_pair(key: jax.Array, config: PairConfig) -> Drawn:
     """
     draw_key, walk_key = jax.random.split(key)
 
-    def look(draws):
-        """The room of a draw, the distance around its origin."""
+    def draw(state):
+        """The next room, and its longest path."""
+        draws, _, _ = state
         place = room(jax.random.fold_in(draw_key, draws), config.rooms)
-        return place, trace(place, _pose(jnp.zeros(3)), SCOUT).distance
-
-    def chord_of(draws):
-        distance = look(draws)[1]
-        return longest_chord(distance, distance > 0, config=config.explore)
+        distance = trace(place, _pose(jnp.zeros(3)), SCOUT).distance
+        return draws + 1, place, longest_chord(distance, distance > 0, config=config.explore)
 
     def too_short(state):
-        draws, chord = state
-        return (chord.length < config.length) & (draws < ATTEMPTS)
+        draws, _, path = state
+        return (path.length < config.length) & (draws < ATTEMPTS)
 
-    first = (jnp.int32(1), chord_of(0))
-    draws, chord = jax.lax.while_loop(too_short, lambda state: (state[0] + 1, chord_of(state[0])), first)
-    place, _ = look(draws - 1)
-    offsets, start = walk(walk_key, chord, config)
-    source = trace(place, _pose(start), config.source_rows)
+    blank = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), jax.eval_shape(draw, (jnp.int32(0), None, None)))
+    draws, place, path = jax.lax.while_loop(too_short, draw, blank)
+    offsets, start = walk(walk_key, path, config)
     clean = trace(place, _pose(start + offsets), config.height, samples=config.samples)
-    panorama = Panorama(source.rgb, source.distance, source.distance > 0)
-    degraded, needed = _degraded(panorama, _pose(offsets), config)
-    return Drawn(Pair(_clean(clean.rgb, clean.distance, offsets), degraded), chord.length, draws, needed)
+    source = clean.rgb[0], clean.distance[0]
+    if (config.source_rows, config.samples) != (config.height, 1):
+        apart = trace(place, _pose(start), config.source_rows)
+        source = apart.rgb, apart.distance
+    degraded, needed = _degraded(Panorama(*source, source[1] > 0), _pose(offsets), config)
+    return Drawn(Pair(_clean(clean.rgb, clean.distance, offsets), degraded), path.length, draws, needed)
 
 
 def make_pair(key: jax.Array, config: PairConfig) -> Drawn:

@@ -7,9 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from experiments import pairs
+from experiments import pair_batches, pairs
 from experiments.pair_batches import DrawnPairs
-from experiments.pairs import PairConfig, degrade, make_pair, scene_pair, with_buffers
+from experiments.pairs import Drawn, PairConfig, degrade, make_pair, scene_pair, with_buffers
 from rein3d_jax.errors import InputError
 from rein3d_jax.evaluate.metrics import psnr
 from rein3d_jax.geometry.poses import upright
@@ -22,11 +22,11 @@ ROOMS = RoomConfig(boxes=16, cylinders=8, ellipsoids=8, furnished=0.3)
 CONFIG = PairConfig(height=16, frames=3, speed=4.0, rooms=ROOMS)  # 0.8 m
 
 
-def hall(pose, rows, length=4.0):
-    """A room of `length` x 3 x 2.6 m with a checkered shell, traced without any of the project's rooms."""
+def hall(pose, rows, length=4.0, width=3.0):
+    """A room of `length` x `width` x 2.6 m with a checkered shell, traced without any of the project's rooms."""
     half = length / 2
-    shell = RoomShell(jnp.zeros(()), jnp.array([half, 1.5, half, 1.5]), jnp.float32(1.6), jnp.float32(1.0))
-    rays = rays_of_pose(pose, rows)
+    shell = RoomShell(jnp.zeros(()), jnp.array([half, width / 2, half, width / 2]), jnp.float32(1.6), jnp.float32(1.0))
+    rays = rays_of_pose(pose, rows, 2 * rows)
     distance, _ = meet_shell(shell, pose[:3, 3], rays)
     points = pose[:3, 3] + rays * distance[..., None]
     return 0.5 + 0.4 * jnp.sin(2 * points), distance
@@ -61,7 +61,7 @@ def test_both_clips_show_the_same_place(drawn, source):
     # Frame 0 is what was lifted; 16 rows are coarse, the splats overlap: a blur, no shift.
     assert float(psnr(degraded.rgb[0], clean.rgb[0])) > 20
     ratio = jnp.where(seen, degraded.distance / clean.distance, jnp.nan)
-    assert abs(float(jnp.nanmedian(ratio)) - 1) < 0.03  # a pixel is 11 degrees wide
+    assert abs(float(jnp.nanmedian(ratio)) - 1) < 0.06  # a splat is 11 degrees wide: what it covers is not all as far
 
 
 def test_a_key_is_a_pair_and_the_path_is_free(drawn):
@@ -84,7 +84,7 @@ def test_buffers_grow_until_nothing_is_dropped(drawn, monkeypatch):
         return dataclasses.replace(config, rasterize=pairs.enlarge(config.rasterize, 512, 64, 64, 64))
 
     pose = drawn.pair.clean.world_from_camera
-    source = Panorama(drawn.pair.clean.rgb[0], drawn.pair.clean.distance[0], jnp.ones((16, 32), bool))
+    source = Panorama(drawn.pair.clean.rgb[0], drawn.pair.clean.distance[0], jnp.ones((16, 32), bool))  # as lifted
     whole = degrade(source, pose, config=CONFIG)
     monkeypatch.setattr(pairs, "with_buffers", small)
     grown = degrade(source, pose, config=CONFIG)
@@ -93,28 +93,38 @@ def test_buffers_grow_until_nothing_is_dropped(drawn, monkeypatch):
     np.testing.assert_allclose(whole.alpha, drawn.pair.degraded.alpha, atol=1e-5)  # and it is what the pair holds
 
 
-def test_pairs_made_on_the_device_are_those_of_their_keys(drawn):
-    source = DrawnPairs(CONFIG, batch=2, seed=7, host=1, hosts=2)
-    batch = source.at(3)
-    alone = make_pair(jax.random.fold_in(jax.random.key(7), (3 * 2 + 1) * 2 + 1), CONFIG).pair
-    # vmap may round otherwise, which a shadow's or a silhouette's edge can turn into another colour: few pixels.
-    apart = jnp.abs(batch.clean.rgb[1] - alone.clean.rgb).max(axis=-1) > 1e-3
-    assert float(apart.mean()) < 0.01
-    np.testing.assert_allclose(batch.clean.world_from_camera[1], alone.clean.world_from_camera, atol=1e-5)
+def test_pairs_made_on_the_device_are_those_of_their_keys(monkeypatch):
+    def keyed(key, config):
+        """Stands for a room: what is drawn is the key."""
+        return Drawn(jax.random.uniform(key), jnp.float32(config.length), jnp.int32(1), jnp.zeros(4, jnp.int32))
+
+    monkeypatch.setattr(pair_batches, "room_pair", keyed)
+    source = DrawnPairs(dataclasses.replace(CONFIG, rate=11.0), batch=2, seed=7, host=1, hosts=2)
+    indices = (3 * 2 + 1) * 2 + jnp.arange(2)  # step 3, host 1: no other step or host has these
+    expected = [jax.random.uniform(jax.random.fold_in(jax.random.key(7), index)) for index in indices]
+    np.testing.assert_array_equal(source.at(3), jnp.stack(expected))
+
+
+def test_pairs_can_be_made_on_an_accelerator():
+    keys = jax.random.split(jax.random.key(0), 2)
+    exported = jax.export.export(pair_batches._batch, platforms=("cuda", "tpu"))(keys, config=with_buffers(CONFIG))
+    shapes = {(2, 3, 16, 32, 3), (2, 3, 16, 32), (2, 3, 4, 4), (2,), (2, 4)}
+    assert {aval.shape for aval in exported.out_avals} == shapes
 
 
 def test_a_path_that_no_room_has_is_refused(monkeypatch):
-    monkeypatch.setattr(pairs, "ATTEMPTS", 2)
-    with pytest.raises(InputError, match=r"none of 2 rooms has a straight path of 80 m"):
-        make_pair(jax.random.key(0), dataclasses.replace(CONFIG, speed=400.0))
+    short = Drawn(None, jnp.float32(2.5), jnp.int32(pairs.ATTEMPTS), jnp.zeros(4))
+    monkeypatch.setattr(pairs, "_room_pair", lambda key, config: short)
+    with pytest.raises(InputError, match=r"none of 200 rooms has a straight path of 4 m .* the last is 2\.50 m"):
+        make_pair(jax.random.key(0), dataclasses.replace(CONFIG, speed=20.0))
 
 
-@pytest.mark.parametrize("length", [0.5, 1.2])
+@pytest.mark.parametrize("length", [0.5, 1.2])  # 0.5: a path of no length
 def test_a_scene_without_a_path_is_refused(length):
     with pytest.raises(InputError, match=r"longest straight path through its origin has 0\.\d\d m"):
         scene_pair(
             jax.random.key(0),
-            lambda pose, rows: hall(pose, rows, length=length),
+            lambda pose, rows: hall(pose, rows, length, length),
             dataclasses.replace(CONFIG, speed=20.0),
         )
 
