@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
+from rein3d_jax.depth.complete import CompleteConfig, complete_distance
 from rein3d_jax.errors import InputError
 from rein3d_jax.explore.chord import Chord, longest_chord
 from rein3d_jax.explore.profile import ExploreConfig
@@ -40,6 +41,7 @@ class PairConfig:
     samples: int = 1  # rays a pixel and side of a room's frames
     explore: ExploreConfig = ExploreConfig()  # how much clearance a path keeps
     lift: LiftConfig = LiftConfig()
+    depth: CompleteConfig = CompleteConfig()  # where what shows through windows is placed, as in the main job
     rasterize: RasterizeConfig = RasterizeConfig()
     rooms: RoomConfig = RoomConfig()
 
@@ -158,8 +160,10 @@ def walk(key: jax.Array, path: Chord, config: PairConfig) -> tuple[jax.Array, ja
 
 def _degraded(panorama: Panorama, poses: jax.Array, config: PairConfig) -> tuple[Video, jax.Array]:
     """The video, and the buffers (4,) that it called for: it is whole where the config's are as large."""
+    distance = complete_distance(panorama.distance, panorama.valid, config=config.depth)
     everywhere = jnp.ones(panorama.valid.shape, bool)
-    scene = lift(panorama, _pose(jnp.zeros(3)), everywhere, config=config.lift)
+    placed = Panorama(panorama.rgb, distance, everywhere)  # what has no distance has a colour
+    scene = lift(placed, _pose(jnp.zeros(3)), everywhere, config=config.lift)
 
     def look(pose):
         frame = rasterize(scene, equirectangular_camera(pose, config.height), config=config.rasterize)

@@ -51,6 +51,8 @@ def room(key: jax.Array, config: RoomConfig = RoomConfig()) -> Room:
         ambient=ambient,
         exposure=draw_exposure(next(keys), radiosity),
         gamma=jax.random.uniform(next(keys), minval=0.85, maxval=1.15),
+        # Of a key of its own: with any share, a key gives the same room.
+        open_windows=jax.random.bernoulli(jax.random.fold_in(key, 0), config.open_windows),
         overflow=overflow,
     )
 

@@ -87,6 +87,7 @@ class Room:
     ambient: jax.Array  # (2, 3) linear radiosity that comes from below and from above
     exposure: jax.Array  # () display value per linear light
     gamma: jax.Array  # () contrast of the display, around 1
+    open_windows: jax.Array  # () bool, windows give no distance, as in scans and in renders without panes
     overflow: jax.Array  # () int, solids that found no slot
 
 

@@ -23,7 +23,8 @@ def trace(room: Room, world_from_camera: jax.Array, height: int, *, samples: int
     """Equirectangular panoramas of height x 2 height pixels from poses (..., 4, 4), all inside the room's free space.
 
     `samples` x `samples` rays a pixel, averaged as displayed, smooth the silhouettes; textures are smooth already.
-    Distance, normal and object id are those of the ray through the pixel's centre, whatever `samples` is. Pure; works
+    Distance, normal and object id are those of the ray through the pixel's centre, whatever `samples` is; the distance
+    is 0 on the windows of a room whose windows are open. Pure; works
     under jit (height and samples static) and vmap, on any platform. Every pose costs the same.
     """
     assert world_from_camera.shape[-2:] == (4, 4), world_from_camera.shape
@@ -48,7 +49,8 @@ def _frame(room: Room, table: Table, pose: jax.Array, height: int, samples: int)
         colour = _colour(room, table, hits, ray, distance, pose, height)
     else:
         colour = _oversampled(room, table, pose, height, samples)
-    return colour, distance, turned, table.object[hits.index].astype(jnp.int32)
+    seen_through = room.open_windows & _is_window(room, hits) & _on_leaf(room, hits)
+    return colour, jnp.where(seen_through, 0.0, distance), turned, table.object[hits.index].astype(jnp.int32)
 
 
 def _oversampled(room: Room, table: Table, pose: jax.Array, height: int, samples: int) -> Vector:
@@ -119,15 +121,19 @@ def _opening_index(room: Room, hits: Hits) -> jax.Array:
     return jnp.clip(hits.index - FACES, 0, room.openings.wall.shape[0] - 1)
 
 
+def _on_leaf(room: Room, hits: Hits) -> jax.Array:
+    """On the window or door at the end of a recess, not on the recess's sides."""
+    in_recess = (hits.index >= FACES) & (hits.index < FACES + room.openings.wall.shape[0])
+    return in_recess & (hits.face == room.openings.wall[_opening_index(room, hits)] % 2)
+
+
 def _is_window(room: Room, hits: Hits) -> jax.Array:
     return room.openings.window[_opening_index(room, hits)] > 0.5
 
 
 def _pane(room: Room, hits: Hits, du, dv) -> tuple[jax.Array, jax.Array]:
     """(1 on the leaf at the end of a recess, else 0; share of it that is frame and bars)."""
-    opening = _opening_index(room, hits)
-    in_recess = (hits.index >= FACES) & (hits.index < FACES + room.openings.wall.shape[0])
-    pane = in_recess & (hits.face == room.openings.wall[opening] % 2)
+    opening, pane = _opening_index(room, hits), _on_leaf(room, hits)
     wide = jnp.where(hits.face == 0, hits.half[1], hits.half[0])
     u, v = surface_coordinates(hits.face, hits.local)
     columns, rows = room.openings.panes[opening, 0], room.openings.panes[opening, 1]

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from rein3d_jax.geometry.sphere import rays_of_pose
+from rein3d_jax.rooms.config import RoomConfig
+from rein3d_jax.rooms.generate import room as room_from
 
 HEIGHT = 64
 ATOL = 1e-4  # metres: the bar
@@ -101,6 +103,26 @@ def test_distance_is_that_of_every_primitive_tried_in_float64(index, room_of, tr
     assert (wrong & (slant > GRAZING)).mean() < 1e-3
     furniture = view.object >= 10
     assert ((furniture != (ids >= 0)) | (furniture & (view.object != ids))).mean() < 1e-3
+
+
+def test_open_windows_have_a_colour_and_no_distance(many_rooms, room_of, tracer, pose_at):
+    index = int(jnp.argmax((many_rooms.openings.window * (jnp.abs(many_rooms.openings.centre[..., 0]) < 100)).sum(1)))
+    room, pose = room_of(index), pose_at()[None]
+    shut, opened = (tracer(room.replace(open_windows=jnp.array(x)), pose, HEIGHT) for x in (False, True))
+    gone = np.asarray(opened.distance == 0)
+    assert 0.001 < gone.mean() < 0.3
+    np.testing.assert_array_equal(np.asarray(opened.distance)[~gone], np.asarray(shut.distance)[~gone])
+    np.testing.assert_array_equal(opened.rgb, shut.rgb)
+    # Only windows: doors, walls and furniture keep theirs.
+    names = set(np.asarray(shut.object)[gone])
+    assert names <= {6 + i for i in range(room.openings.wall.shape[0]) if room.openings.window[i] > 0.5}
+
+
+def test_the_share_of_open_windows_is_the_config_s():
+    keys = jax.random.split(jax.random.key(3), 64)
+    for share in (0.0, 0.5, 1.0):
+        drawn = jax.vmap(lambda key, share=share: room_from(key, RoomConfig(open_windows=share)).open_windows)(keys)
+        assert abs(float(drawn.mean()) - share) < 0.2  # 3 standard deviations of 64 draws
 
 
 @pytest.mark.parametrize("index", range(6))
