@@ -21,6 +21,7 @@ from rein3d_jax.geometry.sphere import pixel_rays, pixel_solid_angles, rays_of_p
 from rein3d_jax.scene import Panorama, Video
 
 CRACK = 2  # pixels: a hole that a closing of this radius covers lies within one surface
+OUTSIDE = 4.0  # times the median distance: beyond it lies no part of a room
 ON_FACE = 0.1  # relative distance within which a pixel shows the shell and not something before it
 
 
@@ -65,7 +66,9 @@ def fill_from_far_side(rgb: jax.Array, distance: jax.Array, known: jax.Array) ->
     inverse = jnp.where(known, 1 / jnp.where(known, distance, 1.0), 0.0)
     image = jnp.where(known[..., None], jnp.concatenate([rgb, inverse[..., None]], axis=-1), 0.0)
     image, solid = _close_cracks(image, known)
-    filled = push_pull(image, solid.astype(jnp.float32), prefer_far=True)
+    # What shows through a window is farther than any wall, and would be painted over every hole of the room.
+    inside = solid & (image[..., 3] * jnp.nanmedian(jnp.where(known, distance, jnp.nan)) > 1 / OUTSIDE)
+    filled = push_pull(image, inside.astype(jnp.float32), prefer_far=True)
     image = jnp.where(solid[..., None], image, filled)
     far = jnp.where(image[..., 3] > 0, 1 / jnp.where(image[..., 3] > 0, image[..., 3], 1.0), 0.0)
     return jnp.where(known[..., None], rgb, image[..., :3]), jnp.where(known, distance, far)

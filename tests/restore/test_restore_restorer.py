@@ -174,3 +174,13 @@ def test_other_bad_values_are_refused_by_name() -> None:
         RestoreConfig(fuse_every=0)
     with pytest.raises(InputError, match=r"restore\.observed 1"):
         RestoreConfig(observed=1.0)
+
+
+def test_the_far_side_is_no_view_through_a_window():
+    """A bright outside, 20 times as far as the wall that holds the window, is not painted into the room's holes."""
+    video, hole = step_scene()
+    outside = (slice(None), slice(4, 12), slice(44, 52))
+    open_ = video.replace(rgb=video.rgb.at[outside].set(1.0), distance=video.distance.at[outside].set(20 * WALL))
+    with_window, without = (restore(x, "background").rgb[0][hole] for x in (open_, video))
+    np.testing.assert_allclose(with_window, without, atol=0.02)  # the wall's share of each pull changes a little
+    np.testing.assert_array_equal(restore(open_, "background").rgb[outside], 1.0)
