@@ -3,7 +3,7 @@
     python -m experiments.build_dataset --config experiments/recipes/tiny_pairs.toml [--set key=value ...]
         [--worker I/N | --ray N [--ray-address A] | --address HOST:PORT --processes N --process I] [--check]
 
-Writes ArrayRecord shards, a JSON beside each, config.toml and manifest.json. Run again after an interruption it goes on;
+Writes ArrayRecord shards, a JSON beside each, config.toml and manifest.json. Run again after a kill it goes on;
 a damaged shard is named and built again. However many workers, the bytes are the same. --check only looks.
 """
 
