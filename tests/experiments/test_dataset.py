@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from experiments import build_dataset, dataset
+from experiments import build_dataset, dataset, pair_scenes
 from experiments.dataset import DatasetConfig, build_part, shard_path
 from experiments.pair_batches import StoredPairs
 from experiments.pairs import Drawn
@@ -210,6 +210,19 @@ def test_two_ray_workers_write_what_one_process_does(scenes, tmp_path):
     assert "shaft.obj" in manifest["shards"][3]["left_out"][0]
     build_with_ray(DatasetConfig(**{**vars(config), "output": str(tmp_path / "two")}), 2)
     assert bytes_in(tmp_path / "two") == one
+
+
+def test_houses_give_a_place_for_each_room(tmp_path, monkeypatch):
+    monkeypatch.setattr(pair_scenes, "room_names", lambda path: [f"{path.stem}-bed", f"{path.stem}-bath"])
+    for name in ("b.json", "a.json", "c.glb", "readme.txt"):
+        (tmp_path / name).touch()
+    places = pair_scenes.scene_places(pair_scenes.SceneConfig(folder=str(tmp_path), models="3D-FUTURE-model"))
+    assert [(path.name, room) for path, room in places] == [
+        ("c.glb", None), ("a.json", "a-bed"), ("a.json", "a-bath"), ("b.json", "b-bed"), ("b.json", "b-bath"),
+    ]  # fmt: skip
+    (tmp_path / "c.glb").unlink()
+    with pytest.raises(InputError, match=r"holds no \.glb"):  # without the models, houses are no scenes
+        pair_scenes.scene_places(pair_scenes.SceneConfig(folder=str(tmp_path)))
 
 
 def test_a_worker_of_ray_says_what_is_at_fault(tmp_path):
