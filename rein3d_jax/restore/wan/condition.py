@@ -45,7 +45,8 @@ def control_latents(encode: Encode, rgb: jax.Array, alpha: jax.Array, anchor: ja
     Colours are sRGB in [0, 1]. The anchor takes the first place in time, with a mask of 0: all of it is kept.
     """
     mask = mask_of(alpha)
-    kept, made = (encode(stream) for stream in streams(signal_of(rgb, alpha), mask))
+    # One after the other: the VAE is compiled once, and only one clip's activations live.
+    kept, made = jax.lax.map(encode, jnp.stack(streams(signal_of(rgb, alpha), mask)))
     folded = fold_mask(mask, stride, kept.shape[1]).astype(kept.dtype)
     video = jnp.concatenate([kept, made, folded], axis=-1)
     first = encode(2 * anchor[:, None] - 1)

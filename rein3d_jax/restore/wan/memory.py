@@ -16,6 +16,8 @@ import numpy as np
 from rein3d_jax.errors import InputError
 from rein3d_jax.restore.wan.config import DitConfig, VaeConfig, WanConfig
 from rein3d_jax.restore.wan.dit import Dit
+from rein3d_jax.restore.wan.lora import leaves_by_path
+from rein3d_jax.restore.wan.trainable import TrainableConfig, start_training
 from rein3d_jax.restore.wan.vae import Vae
 from rein3d_jax.restore.wan.windows import latent_length
 
@@ -28,16 +30,16 @@ class Workload:
     height: int = 448
     width: int = 896
     batch: int = 1  # clips on one device
-    train: bool = False  # with AdamW: gradients, and two moments in the parameters' own types
+    train: bool = False  # with AdamW and a moving average
+    trainable: TrainableConfig = TrainableConfig("all")
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """Bytes on one device. The VAE and the transformer take turns; the larger activations count. The VAE codes one
-    clip at a time, whatever the batch."""
+    """Bytes on one device. The VAE and the transformer take turns; the larger activations count."""
 
     parameters: int
-    optimizer: int  # gradients included
+    optimizer: int  # gradients, two moments and the moving average, in the parameters' own types; what LoRA merges
     dit_activations: int
     vae_activations: int
 
@@ -72,9 +74,8 @@ def count(shapes) -> int:
 def forecast(config: WanConfig, work: Workload) -> Forecast:
     """What `work` needs; training updates the transformer, the VAE stays as it is."""
     dit, vae = (_bytes(shapes) for shapes in (dit_shapes(config.dit), vae_shapes(config.vae)))
-    return Forecast(
-        dit + vae, 3 * dit if work.train else 0, _dit_activations(config, work), _vae_activations(config, work)
-    )
+    training = _training_bytes(config.dit, work.trainable) if work.train else 0
+    return Forecast(dit + vae, training, _dit_activations(config, work), _vae_activations(config, work))
 
 
 def require_fit(config: WanConfig, work: Workload, capacity: int) -> Forecast:
@@ -99,6 +100,7 @@ def _advice(config, work, need, capacity):
     fixed = need.parameters + need.optimizer
     return [
         (work.train and not config.dit.remat, "set dit.remat"),
+        (work.train and work.trainable.part == "all", "train the adapter alone"),
         (config.dit.dtype == "float32", "set dit.dtype to bfloat16"),
         (work.batch > 1, "lower the batch a device, or use more devices"),
         (not work.train and config.dit.param_dtype == "float32", "set dit.param_dtype to bfloat16"),
@@ -129,10 +131,19 @@ def _dit_activations(config, work):
     return kept + 2 * logits
 
 
+def _training_bytes(config, trainable):
+    """Four numbers for each that is trained. LoRA's merged kernels exist beside the base, and so do their gradients."""
+    shapes = dit_shapes(config)
+    if trainable.part != "lora":
+        return 4 * _bytes(start_training(None, shapes, trainable)[0])
+    pairs = jax.eval_shape(lambda: start_training(jax.random.key(0), shapes, trainable)[0])
+    return 4 * _bytes(pairs) + 2 * _bytes([leaf for path, leaf in leaves_by_path(shapes).items() if path in pairs])
+
+
 def _vae_activations(config, work):
     """The widest place is the full-size stage: a convolution's padded input, its output, the shortcut, a norm."""
     size = np.dtype(jnp.dtype(config.vae.dtype)).itemsize
-    return 4 * work.frames * work.height * work.width * config.vae.base * size
+    return 4 * work.batch * work.frames * work.height * work.width * config.vae.base * size
 
 
 def _bytes(shapes):

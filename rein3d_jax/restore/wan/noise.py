@@ -15,9 +15,14 @@ from rein3d_jax.errors import InputError
 
 def draw_noise(key: jax.Array, shape: tuple[int, ...], *, kind: str = "latitude") -> jax.Array:
     """(..., h, w, c) float32 at latent resolution; rows are latitudes. Raises InputError for an unknown kind."""
-    if kind not in KINDS:
-        raise InputError(f'noise "{kind}" is unknown; choose one of {", ".join(KINDS)}')
+    require_kind("noise", kind)
     return KINDS[kind](key, shape)
+
+
+def require_kind(setting: str, kind: str) -> None:
+    """Raises InputError, naming the `setting`, for an unknown kind of noise."""
+    if kind not in KINDS:
+        raise InputError(f'{setting} "{kind}" is unknown; choose one of {", ".join(KINDS)}')
 
 
 def white_noise(key: jax.Array, shape: tuple[int, ...]) -> jax.Array:

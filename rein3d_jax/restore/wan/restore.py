@@ -8,15 +8,18 @@ import jax.numpy as jnp
 from flax import struct
 
 from rein3d_jax.errors import InputError
+from rein3d_jax.restore.background import Background, restore_background
+from rein3d_jax.restore.blend import blend
 from rein3d_jax.restore.wan.condition import control_latents
 from rein3d_jax.restore.wan.config import WanConfig
 from rein3d_jax.restore.wan.dit import Dit
-from rein3d_jax.restore.wan.noise import KINDS, draw_noise
+from rein3d_jax.restore.wan.noise import draw_noise, require_kind
 from rein3d_jax.restore.wan.sampler import guided, sample
 from rein3d_jax.restore.wan.schedule import sampling_sigmas
 from rein3d_jax.restore.wan.solver import SOLVERS
 from rein3d_jax.restore.wan.vae import LATENT, Vae
 from rein3d_jax.restore.wan.windows import WindowConfig, latent_length, restore_in_windows
+from rein3d_jax.scene import Video
 
 
 @dataclass(frozen=True)
@@ -32,9 +35,9 @@ class SampleConfig:
     def __post_init__(self):
         if self.steps < 1:
             raise InputError(f"sample.steps {self.steps} must be at least 1")
-        for name, value, known in (("solver", self.solver, SOLVERS), ("noise", self.noise, KINDS)):
-            if value not in known:
-                raise InputError(f'sample.{name} "{value}" is unknown; choose one of {", ".join(known)}')
+        if self.solver not in SOLVERS:
+            raise InputError(f'sample.solver "{self.solver}" is unknown; choose one of {", ".join(SOLVERS)}')
+        require_kind("sample.noise", self.noise)
 
 
 @struct.dataclass
@@ -48,32 +51,58 @@ class WanParams:
 
 
 def restore_video(
+    video: Video,
+    key: jax.Array,
+    *,
+    params: WanParams,
+    config: WanConfig,
+    sampling: SampleConfig,
+    observed: float,
+    background: Background | None = None,
+) -> Video:
+    """A restorer once all keywords are bound. The context anchor is frame 0, which stands at the world's origin.
+
+    What was observed (alpha near 1) returns as it was, guesses take its colours. The network knows no distance: holes
+    take the background fill's. Raises InputError unless tokens fill a frame (multiples of 16 pixels).
+    """
+    require_size(*video.alpha.shape[1:], config)
+    key_noise, key_turn = jax.random.split(key)
+    noise = clip_noise(key_noise, video.alpha.shape, config, sampling.noise)
+    drawn = restore_frames(
+        key_turn, params, video.rgb, video.alpha, video.rgb[0], noise, config=config, sampling=sampling
+    )
+    filled = restore_background(video, observed=observed, background=background)
+    return filled.replace(rgb=blend(drawn, video.rgb, video.alpha, observed=observed))
+
+
+def clip_noise(key: jax.Array, shape: tuple[int, int, int], config: WanConfig, kind: str) -> jax.Array:
+    """(1 + latents, h', w', 16) for a clip of `shape` (t, h, w) pixels; the anchor's comes first."""
+    frames, height, width = shape
+    size = (1 + latent_length(frames), height // config.vae.stride, width // config.vae.stride, LATENT)
+    return draw_noise(key, size, kind=kind)
+
+
+def restore_frames(
     key: jax.Array,
     params: WanParams,
     rgb: jax.Array,
     alpha: jax.Array,
     anchor: jax.Array,
+    noise: jax.Array,
     *,
     config: WanConfig,
     sampling: SampleConfig,
 ) -> jax.Array:
-    """Clean sRGB (t, h, w, 3) of a degraded clip rgb (t, h, w, 3), alpha (t, h, w), any t; anchor (h, w, 3) is the
-    panorama at the world's origin. Every pixel is the network's: who must keep observed ones puts them back.
+    """Clean sRGB (t, h, w, 3), every pixel the network's, of a degraded clip rgb (t, h, w, 3), alpha (t, h, w), any t.
 
-    Raises InputError unless h and w are multiples of what a token covers (16 pixels).
+    anchor (h, w, 3) is the panorama at the world's origin, noise that of `clip_noise`; the key turns the panorama
+    between steps.
     """
-    stride, patch = config.vae.stride, config.dit.patch
-    require_size(*alpha.shape[1:], config)
-    latent = (alpha.shape[1] // stride, alpha.shape[2] // stride, LATENT)
-    key_noise, key_turn = jax.random.split(key)
-    # The anchor's noise, in front, is the same in each window, too.
-    noise = draw_noise(key_noise, (1 + latent_length(len(rgb)), *latent), kind=sampling.noise)
-    turn_by = patch[2] if sampling.turn else 0
+    turn_by = config.dit.patch[2] if sampling.turn else 0
 
     def restore(part_rgb, part_alpha, part_noise):
-        part_noise = jnp.concatenate([noise[:1], part_noise])
-        part = (part_rgb, part_alpha, anchor, part_noise)
-        return _restore_clip(key_turn, params, *part, config=config, sampling=sampling, turn_by=turn_by)
+        part = (part_rgb, part_alpha, anchor, jnp.concatenate([noise[:1], part_noise]))
+        return _restore_clip(key, params, *part, config=config, sampling=sampling, turn_by=turn_by)
 
     return restore_in_windows(restore, rgb, alpha, noise[1:], sampling.windows)
 
