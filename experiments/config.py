@@ -28,7 +28,7 @@ def load_config(cls: type[Config], path: str | Path, overrides: Sequence[str] = 
     """The recipe at `path` as a `cls`, each override "stage.key=value" laid over it in turn.
 
     Raises InputError for a file that cannot be read, for an unknown or missing key, a wrong type, a failed check."""
-    table = _read(Path(path))
+    table = read_recipe(path)
     for override in overrides:
         table = _merge(table, _override(override))
     _refuse_unknown(cls, table, "", list(_known_keys(cls)))
@@ -40,7 +40,9 @@ def dump_config(config: Any) -> str:
     return "\n".join(_tables(config, "")).lstrip("\n") + "\n"
 
 
-def _read(path: Path) -> dict:
+def read_recipe(path: str | Path) -> dict:
+    """The recipe's table as it stands. Raises InputError for a file that cannot be read."""
+    path = Path(path)
     try:
         return tomllib.loads(path.read_text("utf-8-sig"))
     except OSError as error:

@@ -17,7 +17,7 @@ from rein3d_jax.geometry.sphere import rays_of_pose, world_from_camera_axes
 from rein3d_jax.lift import LiftConfig, compact, lift, merge, with_capacity
 from rein3d_jax.rasterize import RasterizeConfig, allocate, enlarge, render
 from rein3d_jax.refine import RefineConfig, Views, join_views, refine, views_from_panorama
-from rein3d_jax.restore import Background, RestoreConfig, background_of, restorer
+from rein3d_jax.restore import Background, Network, RestoreConfig, background_of, restorer
 from rein3d_jax.scene import Gaussians, Panorama, Video
 
 GOLDEN_TURN = 2.399963  # radians: successive multiples spread the cuts between a trajectory's views evenly
@@ -102,9 +102,10 @@ def restore_trajectory(
     *,
     stages: Stages,
     background: Background | None,
+    network: Network | None = None,
 ) -> Restored:
     """The state after trajectory `index`; `last` is the one before, None at the first (paper Sec. 3.1, 3.2).
-    `background` is what `room_background` found."""
+    `background` is what `room_background` found, `network` what stages.restore was trained to, where it was."""
     if last is None:
         scene, overflow, raster = coarse, 0, _first_buffers(coarse, trajectories, stages)
     else:
@@ -113,7 +114,7 @@ def restore_trajectory(
     poses = trajectories.world_from_camera[index, : int(trajectories.counts[index])]
     seen = scene if stages.restore.sequential else coarse
     degraded, raster = render_video(seen, poses, stages.restore.height, raster)
-    restored = restorer(stages.restore, background)(degraded, jax.random.fold_in(key, index))
+    restored = restorer(stages.restore, background, network)(degraded, jax.random.fold_in(key, index))
     if stages.restore.method != "none":
         scene, dropped, raster = _fuse(scene, degraded, restored, panorama, stages, raster)
         overflow += dropped

@@ -39,6 +39,7 @@ from experiments.pipeline import (
 )
 from experiments.progress import Progress
 from experiments.quality import quality, render_views
+from experiments.restorer_network import read_network, weights_fingerprint
 from experiments.stage_store import StageStore
 from rein3d_jax.depth.room_shell import RoomShellConfig
 from rein3d_jax.errors import InputError
@@ -157,13 +158,14 @@ def _stages(config: ReconstructConfig, files: str, store: StageStore, progress: 
 def _restored(config, table, store: StageStore, panorama, coarse, trajectories, key):
     """The state after each trajectory, read where it was saved."""
     background, last = room_background(panorama, config.restore), None
+    network, weights = read_network(config.restore), weights_fingerprint(config.restore)
     for index in range(config.explore.trajectories):
 
         def restore_next(index=index, last=last):
             arguments = (coarse, panorama, trajectories, index, last, key)
-            return restore_trajectory(*arguments, stages=config, background=background)
+            return restore_trajectory(*arguments, stages=config, background=background, network=network)
 
-        depends = [table["restore"], table["rasterize"], config.seed, index]
+        depends = [table["restore"], weights, table["rasterize"], config.seed, index]
         last = store.run(f"restore-{index:02d}", depends, _blank_restored(), restore_next)
         yield last
 

@@ -48,15 +48,20 @@ def scene_look(gaussians: Gaussians, cameras: Sequence[Camera], raster: Rasteriz
     return look
 
 
-def filled_look(look: Look, restorer: Restorer, *, rows: int, observed: float) -> Look:
+def filled_look(look: Look, restorer: Restorer, *, rows: int, observed: float, anchored: bool) -> Look:
     """`look` with its holes (alpha below `observed`) filled by a restorer of panoramas: of the panorama itself, or,
-    for a pinhole camera, as the filled panorama of `rows` rows at the same place shows them."""
+    for a pinhole camera, as the filled panorama of `rows` rows at the same place shows them. A restorer that is
+    `anchored` sees the panorama at the origin first, as of a clip of two frames."""
+
+    @lru_cache(maxsize=1)
+    def anchor(height: int) -> tuple[jax.Array, ...]:
+        camera = equirectangular_camera(origin_pose(), height)
+        return (*look(camera), camera.world_from_camera)
 
     def filled(camera: Camera) -> Shown:
-        seen = look(camera)
-        one = (x[None] for x in (*seen, camera.world_from_camera))
-        video = restorer(Video(*one), jax.random.key(0))
-        return Shown(video.rgb[0], jnp.ones_like(seen.alpha), video.distance[0])
+        frames = [anchor(camera.height)] * anchored + [(*look(camera), camera.world_from_camera)]
+        video = restorer(Video(*map(jnp.stack, zip(*frames, strict=True))), jax.random.key(0))
+        return Shown(video.rgb[-1], jnp.ones_like(video.alpha[-1]), video.distance[-1])
 
     @lru_cache(maxsize=1)  # views at one place follow one another
     def around(place: tuple[float, ...]) -> tuple[jax.Array, jax.Array]:

@@ -12,17 +12,20 @@ from experiments.evaluation.room import Room, timed, whole
 from experiments.flythrough import FilmConfig
 from experiments.inputs import InputConfig
 from experiments.reconstruct import ReconstructConfig, reconstruct
+from experiments.restorer_network import read_network
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.json_file import read_json
 from rein3d_jax.io.ply import read_ply
 from rein3d_jax.restore import restorer
-from rein3d_jax.restore.restorer import METHODS, Restorer
+from rein3d_jax.restore.restorer import DIFFUSION, LEARNED, METHODS, Restorer
 from rein3d_jax.scene import Camera, Gaussians
 
 COARSE, MESH, REFINED = "coarse", "mesh_warp", "refined"
-FILLS = tuple(name for name in METHODS if name != "none")
-OF_CLIPS = (COARSE, *FILLS, MESH)
-OF_SCENES = (COARSE, *FILLS, MESH, REFINED)
+BLIND = ("telea", "navier_stokes")  # fills that know nothing of the room
+ANCHORED = (LEARNED, DIFFUSION)  # restorers that compare each frame with the first
+RESTORERS = tuple(name for name in METHODS if name != "none")
+OF_CLIPS = (COARSE, *RESTORERS, MESH)
+OF_SCENES = (COARSE, *RESTORERS, MESH, REFINED)
 
 
 class Built(NamedTuple):
@@ -34,11 +37,12 @@ class Built(NamedTuple):
 
 
 def chosen(names: Sequence[str] | None, offered: Sequence[str]) -> list[str]:
-    """`names` that are among those `offered`, or all. Raises InputError for one that no protocol knows."""
+    """`names` that are among those `offered`, or all but the one whose weights do not come with the package. Raises
+    InputError for one that no protocol knows."""
     for name in names or ():
         if name not in OF_SCENES:
             raise InputError(f'--methods: "{name}" is unknown; choose from {", ".join(OF_SCENES)}')
-    return [name for name in offered if names is None or name in names]
+    return [name for name in offered if (name != DIFFUSION if names is None else name in names)]
 
 
 def build(method: str, room: Room, cameras: Sequence[Camera], runs: Path) -> Built:
@@ -54,7 +58,7 @@ def build(method: str, room: Room, cameras: Sequence[Camera], runs: Path) -> Bui
     config = room.config.restore
     coarse = _of_scene(*room.coarse, room, with_panoramas(cameras, config.height))
     fill, seconds = fill_of(method, room)
-    look = filled_look(coarse.look, fill, rows=config.height, observed=config.observed)
+    look = filled_look(coarse.look, fill, rows=config.height, observed=config.observed, anchored=method in ANCHORED)
     return coarse._replace(look=look, seconds=coarse.seconds + seconds)
 
 
@@ -62,7 +66,7 @@ def fill_of(method: str, room: Room) -> tuple[Restorer, float]:
     """The restorer of that name with the recipe's settings, and the seconds of what it knows beforehand."""
     background, seconds = room.background
     config = dataclasses.replace(room.config.restore, method=method)
-    return restorer(config, background), seconds if method == "background" else 0.0
+    return restorer(config, background, read_network(config)), 0.0 if method in BLIND else seconds
 
 
 def _of_scene(gaussians: Gaussians, seconds: float, room: Room, cameras: Sequence[Camera]) -> Built:

@@ -1,14 +1,17 @@
 """The devices of all hosts in one row, and arrays laid over them."""
 
+import math
 from typing import Any
 
 import jax
 import numpy as np
+from jax.experimental import multihost_utils
 from jax.sharding import AxisType, Mesh, NamedSharding, PartitionSpec
 
 from rein3d_jax.errors import InputError
 
 DATA = "data"  # the mesh's only axis: examples
+SMALL = 1024  # numbers in an array below which splitting it costs more than it saves
 
 
 def join_hosts(address: str | None, count: int | None, index: int | None) -> None:
@@ -35,6 +38,26 @@ def share_batch(mesh: Mesh, batch: Any, axis: int = 0) -> Any:
     return jax.tree.map(lambda x: jax.make_array_from_process_local_data(sharding, np.asarray(x)), batch)
 
 
+def spread(mesh: Mesh, tree: Any) -> Any:
+    """How a tree of arrays is split over the mesh: each along its longest axis that the devices divide. What has none,
+    or fewer than SMALL numbers, is on every device."""
+
+    def layout(array) -> NamedSharding:
+        fitting = [axis for axis, size in enumerate(array.shape) if size % mesh.size == 0]
+        if not fitting or math.prod(array.shape) < SMALL:
+            return NamedSharding(mesh, PartitionSpec())
+        longest = max(fitting, key=lambda axis: array.shape[axis])
+        return NamedSharding(mesh, PartitionSpec(*[None] * longest, DATA))
+
+    return jax.tree.map(layout, tree)
+
+
 def gather(tree: Any) -> Any:
-    """Replicated arrays, which every host holds whole, as NumPy's."""
-    return jax.tree.map(lambda x: np.asarray(x.addressable_data(0)) if isinstance(x, jax.Array) else x, tree)
+    """Arrays laid over the devices of all hosts, whole, as NumPy's. All hosts' work where they are split."""
+    return jax.tree.map(lambda x: _whole(x) if isinstance(x, jax.Array) else x, tree)
+
+
+def _whole(array: jax.Array) -> np.ndarray:
+    if array.is_fully_replicated:
+        return np.asarray(array.addressable_data(0))
+    return np.asarray(multihost_utils.process_allgather(array, tiled=True))

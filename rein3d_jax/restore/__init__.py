@@ -5,6 +5,6 @@ alpha still saying what was observed: a restored pixel is a guess, and who uses 
 """
 
 from rein3d_jax.restore.background import Background, background_of
-from rein3d_jax.restore.restorer import RestoreConfig, restorer
+from rein3d_jax.restore.restorer import Network, RestoreConfig, restorer
 
-__all__ = ["Background", "RestoreConfig", "background_of", "restorer"]
+__all__ = ["Background", "Network", "RestoreConfig", "background_of", "restorer"]

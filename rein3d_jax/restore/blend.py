@@ -18,9 +18,14 @@ DAMPING = 3.0  # pixels' worth of belief that the colours need no change, for cl
 
 def blend(restored: jax.Array, rendered: jax.Array, alpha: jax.Array, *, observed: float) -> jax.Array:
     """sRGB (t, h, w, 3) in [0, 1] of a clip that a restorer redrew, and of the clip as it was, alpha (t, h, w)."""
+    matched = jnp.clip(match_colours(restored, rendered, observed_share(alpha, observed)), 0.0, 1.0)
+    return keep_observed(matched, rendered, alpha, observed=observed)
+
+
+def keep_observed(restored: jax.Array, rendered: jax.Array, alpha: jax.Array, *, observed: float) -> jax.Array:
+    """The same, colours taken as they are: for a restorer that redraws holes alone."""
     share = observed_share(alpha, observed)
-    matched = jnp.clip(match_colours(restored, rendered, share), 0.0, 1.0)
-    mixed = matched + share[..., None] * (rendered - matched)
+    mixed = restored + share[..., None] * (rendered - restored)
     return jnp.where(share[..., None] == 1, rendered, mixed)  # 1 - w and w do not sum to 1 to the bit
 
 

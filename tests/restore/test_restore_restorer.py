@@ -11,7 +11,7 @@ from rein3d_jax.geometry.pyramid import levels
 from rein3d_jax.geometry.shell import RoomShell, meet_shell
 from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.restore import RestoreConfig, background_of, restorer
-from rein3d_jax.restore.restorer import METHODS
+from rein3d_jax.restore.restorer import FILLS
 from rein3d_jax.scene import Panorama, Video
 
 HEIGHT, WIDTH = 32, 64
@@ -68,7 +68,7 @@ def restore(video: Video, method: str, shell=None) -> Video:
     return restorer(RestoreConfig(method=method, height=HEIGHT), shell)(video, KEY)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", FILLS)
 def test_observed_pixels_stay_to_the_bit_and_all_is_finite(method) -> None:
     video = noise()
     restored = restore(video, method)
@@ -88,7 +88,7 @@ def test_the_shell_fill_keeps_observed_pixels_to_the_bit() -> None:
     assert np.all(np.isfinite(restored.rgb)) and np.all(restored.distance > 0)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", FILLS)
 def test_a_frame_that_shows_nothing_stays_finite(method) -> None:
     nothing = video_of(jnp.zeros((HEIGHT, WIDTH, 3)), jnp.zeros((HEIGHT, WIDTH)), jnp.zeros((HEIGHT, WIDTH), bool))
     restored = restore(nothing, method)

@@ -32,6 +32,7 @@ class Workload:
     batch: int = 1  # clips on one device
     train: bool = False  # with AdamW and a moving average
     trainable: TrainableConfig = TrainableConfig("all")
+    shards: int = 1  # devices that share the optimizer; parameters count whole, for they are gathered to be used
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def count(shapes) -> int:
 def forecast(config: WanConfig, work: Workload) -> Forecast:
     """What `work` needs; training updates the transformer, the VAE stays as it is."""
     dit, vae = (_bytes(shapes) for shapes in (dit_shapes(config.dit), vae_shapes(config.vae)))
-    training = _training_bytes(config.dit, work.trainable) if work.train else 0
+    training = _training_bytes(config.dit, work.trainable) // work.shards if work.train else 0
     return Forecast(dit + vae, training, _dit_activations(config, work), _vae_activations(config, work))
 
 

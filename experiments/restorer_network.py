@@ -1,0 +1,57 @@
+"""What the recipe's restorer was trained to, read from restore.weights."""
+
+import hashlib
+from pathlib import Path
+
+import jax
+
+from experiments.wan_weights import read_wan
+from rein3d_jax.errors import InputError
+from rein3d_jax.io.restorer_weights import SHIPPED, read_restorer
+from rein3d_jax.restore.learned.config import NetworkConfig
+from rein3d_jax.restore.learned.network import initial_parameters
+from rein3d_jax.restore.learned.restore import Learned
+from rein3d_jax.restore.restorer import DIFFUSION, LEARNED, Network, RestoreConfig
+
+
+def read_network(config: RestoreConfig) -> Network | None:
+    """None for the fills, which were not trained. Raises InputError for weights that are missing, damaged or made for
+    another network, and for a size of picture that the network does not take."""
+    if config.method == LEARNED:
+        return _learned(config)
+    if config.method != DIFFUSION:
+        return None
+    if config.weights is None:
+        raise InputError("restore.weights is missing: give the folder of Wan2.1-VACE's weights (wan_weights.py)")
+    return read_wan(config.weights, config.diffusion.network)
+
+
+def weights_fingerprint(config: RestoreConfig) -> str:
+    """What the weights' files hold, as one hash: a resumed job must not mix two networks. Empty for the fills."""
+    if config.method not in (LEARNED, DIFFUSION):
+        return ""
+    path, digest = Path(config.weights or SHIPPED), hashlib.sha256()
+    for file in sorted(path.rglob("*.safetensors")) if path.is_dir() else [path]:
+        with open(file, "rb") as content:
+            digest.update(hashlib.file_digest(content, "sha256").digest())
+    return digest.hexdigest()
+
+
+def _learned(config: RestoreConfig) -> Learned:
+    path = config.weights or SHIPPED
+    parameters, sizes = read_restorer(path)
+    try:
+        network = NetworkConfig(**sizes)
+    except TypeError as error:
+        raise InputError(f"{path} names sizes that this network does not have: train it again") from error
+    wanted = jax.eval_shape(lambda: initial_parameters(jax.random.key(0), network))
+    if _shapes(wanted) != _shapes(parameters):
+        raise InputError(f"{path} does not hold the arrays of its own network's sizes: train it again")
+    times, rest = divmod(config.height, network.rows)
+    if rest or times & (times - 1):
+        raise InputError(f"restore.height {config.height} must be {network.rows} times a power of 2 for {path}")
+    return Learned(parameters, network)
+
+
+def _shapes(tree) -> dict:
+    return {jax.tree_util.keystr(path): leaf.shape for path, leaf in jax.tree_util.tree_leaves_with_path(tree)}

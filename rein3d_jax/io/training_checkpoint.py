@@ -1,0 +1,56 @@
+"""Checkpoints of a training run (orbax): written beside the training, whole or not at all; the last and best stay."""
+
+from pathlib import Path
+from typing import Any
+
+import orbax.checkpoint as ocp
+from orbax.checkpoint.checkpoint_managers import AnyPreservationPolicy, BestN, LatestN
+
+from rein3d_jax.errors import InputError
+
+SCORE = "score"
+
+
+class TrainingCheckpoints:
+    """States by step in one folder. A context manager: leaving it waits for what is still being written."""
+
+    def __init__(self, folder: str | Path):
+        keep = AnyPreservationPolicy([LatestN(1), BestN(get_metric_fn=lambda m: m[SCORE], n=1)])
+        options = ocp.CheckpointManagerOptions(
+            preservation_policy=keep, best_fn=lambda metrics: metrics[SCORE], enable_async_checkpointing=True
+        )
+        self.folder = Path(folder).absolute()
+        self.manager = ocp.CheckpointManager(self.folder, options=options)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.manager.wait_until_finished()
+        self.manager.close()
+
+    def save(self, step: int, state: Any, score: float) -> None:
+        """Starts writing `state`, a pytree of arrays; `score` decides which is best: the greatest."""
+        self.manager.save(step, args=ocp.args.StandardSave(state), metrics={SCORE: float(score)})
+
+    def last(self) -> int | None:
+        """The step of the newest whole checkpoint."""
+        return self.manager.latest_step()
+
+    def best(self) -> int | None:
+        """The step of the checkpoint with the greatest score."""
+        return self.manager.best_step()
+
+    def best_score(self) -> float:
+        """Its score; -inf where there is none."""
+        best = self.best()
+        return -float("inf") if best is None else float(self.manager.metrics(best)[SCORE])
+
+    def restore(self, step: int, like: Any) -> Any:
+        """The state saved at `step`, laid over devices as `like` is. Raises InputError if it does not fit."""
+        try:
+            return self.manager.restore(step, args=ocp.args.StandardRestore(like))
+        except (ValueError, KeyError, TypeError, OSError) as error:
+            reason = " ".join(str(error).split())[:300]
+            name = self.folder / str(step)
+            raise InputError(f"{name} does not fit this run ({reason}): choose an empty output") from error
