@@ -28,7 +28,11 @@ def load_config(cls: type[Config], path: str | Path, overrides: Sequence[str] = 
     """The recipe at `path` as a `cls`, each override "stage.key=value" laid over it in turn.
 
     Raises InputError for a file that cannot be read, for an unknown or missing key, a wrong type, a failed check."""
-    table = read_recipe(path)
+    return config_from(cls, read_recipe(path), overrides)
+
+
+def config_from(cls: type[Config], table: Mapping, overrides: Sequence[str] = ()) -> Config:
+    """The same of a table."""
     for override in overrides:
         table = _merge(table, _override(override))
     _refuse_unknown(cls, table, "", list(_known_keys(cls)))

@@ -127,6 +127,7 @@ def _measure(folders: list[Path], jobs: list[tuple[str, list[str]]], options, co
             file = work / protocol / room.name / f"{method}.json"
             by_room[room.name], found = kept(file, depends, partial(PROTOCOLS[protocol][0], method, room, tools))
             print(line(protocol, method, room.name, by_room[room.name].figures, found), flush=True)
+        jax.clear_caches()  # each room compiles for sizes of its own, and a process may map only so much code
     features = "alexnet" if options.i3d is None else "i3d"
     return {
         protocol: {method: table(outcomes[protocol, method], features) for method in methods}

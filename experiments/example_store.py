@@ -78,7 +78,7 @@ def write_examples(folder: str | Path, example: Callable[[int], Example], count:
     it goes on. Raises InputError where the folder holds examples of another count or shape."""
     folder, arrays = Path(folder), {}
     folder.mkdir(parents=True, exist_ok=True)
-    for index in range(len(ExampleStore(folder)) if (folder / COUNT).exists() else 0, count):
+    for index in range(_done(folder, count), count):
         made = example(index)
         parts = {**vars(made.clip), "clean_rgb": made.clean_rgb, "clean_distance": made.clean_distance}
         arrays = arrays or _arrays(folder, count, fields(*np.shape(made.clip.alpha)[:2]), new=index == 0)
@@ -86,6 +86,16 @@ def write_examples(folder: str | Path, example: Callable[[int], Example], count:
             array[index] = _stored(np.asarray(parts[name]), array.dtype)
         write_text(folder / COUNT, json.dumps({"done": index + 1}))
         yield index + 1
+
+
+def _done(folder: Path, count: int) -> int:
+    """Examples that an earlier run left whole in a folder for `count` of them."""
+    if not (folder / COUNT).exists():
+        return 0
+    store = ExampleStore(folder)
+    if (room := len(store.arrays["alpha"])) != count:
+        raise InputError(f"{folder} is a folder for {room} examples, not {count}: choose an empty output")
+    return len(store)
 
 
 def _arrays(folder: Path, count: int, shapes: dict, *, new: bool) -> dict[str, np.ndarray]:

@@ -94,7 +94,10 @@ def batch_gradient(loss: Loss, parameters: Any, batch: Any, total: Total) -> tup
 
     nothing = (jax.tree.map(jnp.zeros_like, parameters), jnp.zeros(()), jnp.zeros(()))
     # Summed after the gradient is taken: pmap's gradient of a psum is n times each device's own, and no sum.
-    alone = len(jax.tree.leaves(batch)[0]) == 1  # unrolled: XLA's CPU code for matrix products is slow inside loops
-    gradient, penalty, weight = total(jax.lax.scan(add, nothing, batch, unroll=alone)[0])
+    if len(jax.tree.leaves(batch)[0]) == 1:  # XLA's CPU code is eight times slower inside a loop, even of one turn
+        sums, _ = add(nothing, jax.tree.map(lambda x: x[0], batch))
+    else:
+        sums, _ = jax.lax.scan(add, nothing, batch)
+    gradient, penalty, weight = total(sums)
     weight = jnp.maximum(weight, 1e-9)
     return jax.tree.map(lambda g: g / weight, gradient), penalty / weight

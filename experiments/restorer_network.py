@@ -10,7 +10,7 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.io.restorer_weights import SHIPPED, read_restorer
 from rein3d_jax.restore.learned.config import NetworkConfig
 from rein3d_jax.restore.learned.network import initial_parameters
-from rein3d_jax.restore.learned.restore import Learned
+from rein3d_jax.restore.learned.sample import Learned
 from rein3d_jax.restore.restorer import DIFFUSION, LEARNED, Network, RestoreConfig
 
 

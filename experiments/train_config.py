@@ -6,6 +6,7 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.parallel import BACKENDS
 from rein3d_jax.restore.learned.config import NetworkConfig
 from rein3d_jax.restore.learned.loss import LossConfig
+from rein3d_jax.restore.noise import require_kind
 
 PRECISIONS = ("float32", "bfloat16")
 
@@ -63,6 +64,7 @@ class TrainConfig:
     backend: str = "jit"  # jit over a mesh | pmap
     devices: int = 0  # 0: all
     noise: float = 0.0  # share of examples at a noise level below 1; 0 trains the one-step prediction alone
+    noise_kind: str = "latitude"  # latitude | white | paper
     log_every: int = 10  # steps
     evaluate_every: int = 200
     save_every: int = 100
@@ -84,5 +86,6 @@ class TrainConfig:
             raise InputError(f'backend "{self.backend}" is unknown; choose one of {", ".join(BACKENDS)}')
         if not 0 <= self.noise <= 1:
             raise InputError(f"noise {self.noise} must lie between 0 and 1")
+        require_kind("noise_kind", self.noise_kind)
         if self.optimizer.warmup + self.optimizer.cooldown > self.steps:
             raise InputError(f"optimizer.warmup and optimizer.cooldown leave nothing of {self.steps} steps")

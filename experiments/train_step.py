@@ -43,7 +43,7 @@ def examples_loss(parameters: dict, batch: Batch, *, config: TrainConfig) -> tup
     """(sum of penalties, sum of weights) of a batch (b, ...)."""
     keys = jax.vmap(jax.random.split)(jax.random.wrap_key_data(batch.seeds))
     examples = jax.vmap(augment)(keys[:, 0], batch.examples)
-    noisy, level = jax.vmap(lambda key, one: noised(key, one, config.noise))(keys[:, 1], examples)
+    noisy, level = jax.vmap(lambda key, one: noised(key, one, config.noise, config.noise_kind))(keys[:, 1], examples)
     dtype = jnp.dtype(config.precision)
     predicted = predict(parameters, examples.clip, noisy, level, config=config.network, dtype=dtype)
     return restoration_loss(predicted, examples, config.loss)

@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+import jax
+import numpy as np
 import orbax.checkpoint as ocp
 from orbax.checkpoint.checkpoint_managers import AnyPreservationPolicy, BestN, LatestN
 
@@ -49,8 +51,18 @@ class TrainingCheckpoints:
     def restore(self, step: int, like: Any) -> Any:
         """The state saved at `step`, laid over devices as `like` is. Raises InputError if it does not fit."""
         try:
-            return self.manager.restore(step, args=ocp.args.StandardRestore(like))
+            state = self.manager.restore(step, args=ocp.args.StandardRestore(like))
+            _require_shapes(state, like)
+            return state
         except (ValueError, KeyError, TypeError, OSError) as error:
             reason = " ".join(str(error).split())[:300]
             name = self.folder / str(step)
             raise InputError(f"{name} does not fit this run ({reason}): choose an empty output") from error
+
+
+def _require_shapes(state: Any, like: Any) -> None:
+    """orbax gives NumPy arrays as they were saved, whatever shape is asked for. Raises ValueError."""
+    wanted = jax.tree.leaves(like)
+    for (path, leaf), other in zip(jax.tree_util.tree_leaves_with_path(state), wanted, strict=True):
+        if np.shape(leaf) != np.shape(other):
+            raise ValueError(f"{jax.tree_util.keystr(path)} is of {np.shape(leaf)}, not {np.shape(other)}")

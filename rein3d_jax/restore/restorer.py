@@ -9,7 +9,8 @@ import jax
 from rein3d_jax.errors import InputError
 from rein3d_jax.restore.background import Background, restore_background
 from rein3d_jax.restore.fills import restore_navier_stokes, restore_none, restore_telea
-from rein3d_jax.restore.learned.restore import Learned, restore_learned
+from rein3d_jax.restore.learned.restore import restore_learned
+from rein3d_jax.restore.learned.sample import Learned
 from rein3d_jax.restore.wan.config import WanConfig
 from rein3d_jax.restore.wan.restore import SampleConfig, WanParams, restore_video
 from rein3d_jax.scene import Video

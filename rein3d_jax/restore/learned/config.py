@@ -17,6 +17,7 @@ class NetworkConfig:
     heads: int = 4
     fine_blocks: int = 1  # convolutional blocks on the way down, and as many on the way up
     expand: int = 3  # width of a block's hidden layer over its own
+    anchor: bool = True  # frames look at the first one; without, it is as if it were not there
 
     def __post_init__(self):
         if self.width % (4 * self.heads):
@@ -26,5 +27,5 @@ class NetworkConfig:
             )
         if self.rows % TOKEN:
             raise InputError(f"network.rows {self.rows} must be a multiple of {TOKEN}")
-        if min(dataclasses.astuple(self)) < 1:
+        if min(self.rows, self.fine, self.width, self.depth, self.heads, self.fine_blocks, self.expand) < 1:
             raise InputError("network: every size must be at least 1")

@@ -15,6 +15,7 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.sphere import latitudes
 from rein3d_jax.restore.learned.condition import Clip, log_distance
 from rein3d_jax.restore.learned.mixture import base
+from rein3d_jax.restore.noise import draw_noise
 
 FLOOR = 1e-3  # mean penalty of a pixel below which an example has nothing left to learn from
 NOISE = 0.2  # standard deviation of e, about that of x_0 in holes
@@ -90,13 +91,14 @@ def _penalty(error: jax.Array, knee: float) -> jax.Array:
     return jnp.sqrt(error**2 + knee**2) - knee
 
 
-def noised(key: jax.Array, example: Example, share: float) -> tuple[jax.Array, jax.Array]:
-    """x_s of one example and its level s: uniform for `share` of the examples, 1 for the others. At level 1 nothing of
-    x_0 is left, so nothing is shown: the network then gives the conditional mean, which one step needs."""
+def noised(key: jax.Array, example: Example, share: float, kind: str = "latitude") -> tuple[jax.Array, jax.Array]:
+    """x_s of one example, with noise of a `kind` of restore/noise.py, and its level s: uniform for `share` of the
+    examples, 1 for the others. At level 1 nothing of x_0 is left, so nothing is shown: the network then gives the
+    conditional mean, which one step needs."""
     wanted = residual(example)
     if share == 0:
         return jnp.zeros_like(wanted), jnp.ones(())
     choose, draw, dots = jax.random.split(key, 3)
     level = jnp.where(jax.random.bernoulli(choose, share), jax.random.uniform(draw), 1.0)
-    noise = NOISE * jax.random.normal(dots, wanted.shape)
+    noise = NOISE * draw_noise(dots, wanted.shape, kind=kind)
     return jnp.where(level < 1, (1 - level) * wanted + level * noise, 0.0), level

@@ -49,13 +49,15 @@ class Block(nn.Module):
     def _space(self, tokens: jax.Array, turn: jax.Array) -> jax.Array:
         query, key, value = self._heads(tokens, "space")
         query, key = rotate(query, turn), rotate(key, turn)
-        # A key of the anchor is turned like the cell it lies in: a frame looks for what lay in that direction.
-        key, value = (jnp.concatenate([x, jnp.broadcast_to(x[:, :1], x.shape)], axis=2) for x in (key, value))
+        if self.config.anchor:
+            # A key of the anchor is turned like the cell it lies in: a frame looks for what lay in that direction.
+            key, value = (jnp.concatenate([x, jnp.broadcast_to(x[:, :1], x.shape)], axis=2) for x in (key, value))
         return nn.Dense(self.config.width, name="space_out")(attend(query, key, value).reshape(tokens.shape))
 
     def _time(self, tokens: jax.Array, turn: jax.Array) -> jax.Array:
-        heads = [jnp.swapaxes(x, 1, 2) for x in self._heads(tokens, "time")]
-        met = jnp.swapaxes(attend(*heads), 1, 2)
+        query, key, value = (jnp.swapaxes(x, 1, 2) for x in self._heads(tokens, "time"))
+        first = 0 if self.config.anchor else 1
+        met = jnp.swapaxes(attend(query, key[:, :, first:], value[:, :, first:]), 1, 2)
         return nn.Dense(self.config.width, name="time_out")(met.reshape(tokens.shape))
 
     def _hidden(self, tokens: jax.Array, turn: jax.Array) -> jax.Array:

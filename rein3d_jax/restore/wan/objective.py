@@ -15,8 +15,8 @@ from flax import struct
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.sphere import latitudes
+from rein3d_jax.restore.noise import draw_noise, require_kind
 from rein3d_jax.restore.wan.condition import Encode, control_latents
-from rein3d_jax.restore.wan.noise import draw_noise, require_kind
 from rein3d_jax.restore.wan.schedule import TIMESTEPS, noised, shifted, velocity_of
 
 Predict = Callable[[jax.Array, jax.Array, jax.Array], jax.Array]  # (x, timestep (b,), control) -> velocity

@@ -10,10 +10,10 @@ from flax import struct
 from rein3d_jax.errors import InputError
 from rein3d_jax.restore.background import Background, restore_background
 from rein3d_jax.restore.blend import blend
+from rein3d_jax.restore.noise import draw_noise, require_kind
 from rein3d_jax.restore.wan.condition import control_latents
 from rein3d_jax.restore.wan.config import WanConfig
 from rein3d_jax.restore.wan.dit import Dit
-from rein3d_jax.restore.wan.noise import draw_noise, require_kind
 from rein3d_jax.restore.wan.sampler import guided, sample
 from rein3d_jax.restore.wan.schedule import sampling_sigmas
 from rein3d_jax.restore.wan.solver import SOLVERS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.restore.wan.noise import draw_noise
+from rein3d_jax.restore.noise import draw_noise
 
 HEIGHT, WIDTH, DRAWS = 8, 16, 10_000
 LATITUDE = (0.5 - (np.arange(HEIGHT) + 0.5) / HEIGHT) * np.pi

@@ -1,0 +1,43 @@
+"""From noise to a clip: a few steps of a trained network."""
+
+from itertools import pairwise
+
+import jax
+import jax.numpy as jnp
+from flax import struct
+
+from rein3d_jax.restore.learned.condition import Clip
+from rein3d_jax.restore.learned.config import NetworkConfig
+from rein3d_jax.restore.learned.loss import NOISE
+from rein3d_jax.restore.learned.mixture import base
+from rein3d_jax.restore.learned.predict import predict
+from rein3d_jax.restore.noise import draw_noise
+
+
+@struct.dataclass
+class Learned:
+    """A trained network."""
+
+    parameters: dict
+    config: NetworkConfig = struct.field(pytree_node=False)
+
+
+def sample(key: jax.Array, learned: Learned, clip: Clip, steps: int) -> jax.Array:
+    """(t, h, w, 4) of a clip (t, h, w): sRGB, not clipped, and the distance's logarithm; down the straight path of
+    loss.py from noise level 1 to 0. One step gives the mean of what may be there, whatever the key; more of them draw
+    from it, if the network was trained with noise."""
+    start = base(clip)
+    noisy = NOISE * draw_noise(key, start.shape)
+    levels = jnp.linspace(1.0, 0.0, steps + 1)
+    for level, lower in pairwise(levels):
+        clean = _clean(learned, clip, noisy, level)
+        noise = (noisy - (1 - level) * clean) / level
+        noisy = (1 - lower) * clean + lower * noise
+    return start + noisy
+
+
+@jax.jit
+def _clean(learned: Learned, clip: Clip, noisy: jax.Array, level: jax.Array) -> jax.Array:
+    shown = jnp.where(level < 1, noisy, 0.0)  # at level 1 nothing is left of what is looked for
+    clips = jax.tree.map(lambda x: x[None], clip)
+    return predict(learned.parameters, clips, shown[None], level[None], config=learned.config)[0]
