@@ -78,7 +78,9 @@ def test_a_file_of_which_a_byte_changed_is_refused_or_reads_as_it_was(written, p
         assert str(written) in str(error) and "\n" not in str(error)
     else:
         assert sizes == SIZE
-        np.testing.assert_allclose(parameters["first"]["kernel"], PARAMETERS["first"]["kernel"], rtol=2**-11, atol=2**-25)
+        np.testing.assert_allclose(
+            parameters["first"]["kernel"], PARAMETERS["first"]["kernel"], rtol=2**-11, atol=2**-25
+        )
 
 
 @pytest.mark.parametrize("sizes", [None, b"", b"\xff", b"[1, 2]", b"3", b'{"rows": null}', b'{"rows": "many"}'])

@@ -41,7 +41,9 @@ def example_of(seed) -> Example:
     clean, distance = values(3), np.broadcast_to(1 + values()[0], SHAPE)  # seen from one place: nothing is hidden
     known = (alpha == 1)[..., None, None]
     fills = np.where(known, clean[..., None, :], values(FILLS, 3))
-    clip = Clip(clean * (alpha[..., None] > 0), alpha, distance * (alpha > 0), fills, 1 + values(FILLS), np.zeros((3, 3)))
+    clip = Clip(
+        clean * (alpha[..., None] > 0), alpha, distance * (alpha > 0), fills, 1 + values(FILLS), np.zeros((3, 3))
+    )
     return jax.tree.map(jnp.float32, Example(clip, clean, distance))
 
 

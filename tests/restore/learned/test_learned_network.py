@@ -83,9 +83,7 @@ def test_a_clip_turned_by_a_multiple_of_the_token_is_restored_turned(rows):
 
 def test_metres_twice_as_long_double_the_distances_and_leave_the_colours():
     clip, noisy = example_of().clip, noise()
-    long = clip.replace(
-        distance=2 * clip.distance, fill_distance=2 * clip.fill_distance, position=2 * clip.position
-    )
+    long = clip.replace(distance=2 * clip.distance, fill_distance=2 * clip.fill_distance, position=2 * clip.position)
     before, after = (predicted(PARAMETERS, x, noisy) + base(x) for x in (clip, long))
     np.testing.assert_allclose(after[..., :3], before[..., :3], atol=ATOL)
     np.testing.assert_allclose(after[..., 3], before[..., 3] + np.log(2), atol=ATOL)
@@ -144,7 +142,9 @@ def test_unfold_undoes_fold(size):
     folded = fold(grid, size)
     assert folded.shape == (2, 8 // size, 16 // size, 3 * size**2)
     np.testing.assert_array_equal(unfold(folded, size), grid.astype(np.float32))
-    np.testing.assert_array_equal(folded[0, 1, 1].reshape(size, size, 3), np.float32(grid[0, size:, size:])[:size, :size])
+    np.testing.assert_array_equal(
+        folded[0, 1, 1].reshape(size, size, 3), np.float32(grid[0, size:, size:])[:size, :size]
+    )
 
 
 def test_a_wrapped_grid_goes_on_at_the_seam_and_repeats_a_poles_row():

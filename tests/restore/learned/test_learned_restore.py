@@ -78,7 +78,9 @@ def test_observed_pixels_stay_to_the_bit_and_all_is_finite(room):
 def test_frames_that_show_nothing_stay_finite(empty, room):
     video = video_of(3)
     video = video.replace(
-        rgb=video.rgb.at[empty].set(0.0), alpha=video.alpha.at[empty].set(0.0), distance=video.distance.at[empty].set(0.0)
+        rgb=video.rgb.at[empty].set(0.0),
+        alpha=video.alpha.at[empty].set(0.0),
+        distance=video.distance.at[empty].set(0.0),
     )
     restored = restore(video, background=room)
     assert np.isfinite(restored.rgb).all() and np.isfinite(restored.distance).all()
