@@ -44,4 +44,4 @@ class Progress:
             self.console.print(f"{name:<12} PSNR {values['psnr']:.2f} dB, SSIM {values['ssim']:.3f} at novel views")
         total, peak = metrics["seconds"]["total"], metrics["peak_bytes"] / 2**30
         self.console.print(f"{metrics['count']['refined']:,} Gaussians in {total:.0f} s, peak memory {peak:.1f} GiB")
-        self.console.print(f"open {output / 'report.html'}")
+        self.console.print(f"open {output / 'viewer.html'} and {output / 'report.html'}")

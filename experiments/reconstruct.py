@@ -3,8 +3,8 @@
     python -m experiments.reconstruct --config experiments/recipes/quick.toml [--input pano.jpg]
         [--distance depth.exr] [--output runs/room] [--set stage.key=value ...] [--resume]
 
-Writes scene.ply, flythrough.mp4, report.html, metrics.json and config.toml into the output folder, and each
-finished stage into its `stages` folder, from which --resume goes on.
+Writes scene.ply, viewer.html, flythrough.mp4, report.html, metrics.json and config.toml into the output folder, and
+each finished stage into its `stages` folder, from which --resume goes on.
 """
 
 import argparse
@@ -41,6 +41,7 @@ from experiments.progress import Progress
 from experiments.quality import quality, render_views
 from experiments.restorer_network import read_network, weights_fingerprint
 from experiments.stage_store import StageStore
+from experiments.walkthrough import walkthrough
 from rein3d_jax.depth.room_shell import RoomShellConfig
 from rein3d_jax.errors import InputError
 from rein3d_jax.evaluate.report import render_report
@@ -194,7 +195,7 @@ def _blank_restored() -> Restored:
 
 def _write(config, output, views, store, progress, started, panorama, origin, coarse, trajectories, videos, refined,
            curves, overflow) -> dict:  # fmt: skip
-    """scene.ply, flythrough.mp4, report.html, metrics.json, in the order in which a user would miss them."""
+    """scene.ply, flythrough.mp4, viewer.html, report.html, metrics.json, in the order in which one would miss them."""
     begun = time.perf_counter()
     write_ply(output / "scene.ply", refined)
     backdrop = jnp.mean(panorama.rgb, axis=(0, 1))
@@ -223,6 +224,7 @@ def _write(config, output, views, store, progress, started, panorama, origin, co
     metrics["seconds"]["total"] = round(time.perf_counter() - started, 3)
     run = story.Run(config.input, config.explore, panorama, origin, trajectories, videos, coarse_ends, refined_ends,
                     views, *pictures, curves, metrics)  # fmt: skip
+    write_text(output / "viewer.html", walkthrough(run, coarse, refined, backdrop, config.rasterize.filter_variance))
     write_text(output / "report.html", render_report(story.tell(run)))
     write_text(output / "metrics.json", json.dumps(metrics, indent=2) + "\n")
     progress.finish(output, metrics)

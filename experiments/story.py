@@ -47,12 +47,13 @@ def tell(run: Run) -> Report:
     return Report(
         title="Your room in 3D",
         summary="One panorama, lifted to 3D, explored, its hidden parts guessed, and everything refined together. "
-        "Open scene.ply in any Gaussian splat viewer; flythrough.mp4 walks the paths below.",
+        "Open viewer.html to walk through it, or scene.ply in any Gaussian splat viewer; flythrough.mp4 walks the "
+        "paths below.",
         facts=tuple(facts),
         distance_origin=_distance_origin(run),
         warnings=tuple(_warnings(run)),
         parts=tuple(_parts(run)),
-        plan=_plan(run),
+        plan=plan(run),
         charts=_charts(run.curves),
         tables=(Table("Where time went", ("Stage", "Seconds"), tuple((k, f"{s:.1f}") for k, s in seconds.items())),),
         sources=_sources(run.config),
@@ -126,7 +127,8 @@ def _jpeg(label: str, rgb) -> Picture:
     return Picture(label, encode_jpeg(np.asarray(rgb)))
 
 
-def _plan(run: Run) -> Plan:
+def plan(run: Run) -> Plan:
+    """The map: walls, where one may walk, and the paths."""
     t = run.trajectories
     paths = tuple(np.asarray(p[: int(n), :2]) for p, n in zip(t.positions, t.counts, strict=True))
     places = {tuple(np.round(np.asarray(v.camera.world_from_camera[:2, 3]), 3)) for v in run.views if is_novel(v)}

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import jax
 import numpy as np
+from jax.sharding import NamedSharding, PartitionSpec
 
 from experiments.example_store import ExampleStore
 from experiments.guarded_step import TrainState
@@ -27,7 +28,8 @@ def train(config: TrainConfig, *, resume: bool = False) -> TrainState:
     _check(config, store, mesh.size)
     step = data_parallel(make_step(config), mesh, backend=config.backend, axis=1)
     with TrainingCheckpoints(output / "checkpoints") as checkpoints:
-        state = _first_state(config, checkpoints, resume)
+        # Laid over the mesh as the step returns it: another layout would compile the step a second time.
+        state = jax.device_put(_first_state(config, checkpoints, resume), NamedSharding(mesh, PartitionSpec()))
         with TrainingRun(config, store, checkpoints, int(state.step)) as run:
             while run.step < config.steps:
                 host, hosts = jax.process_index(), jax.process_count()

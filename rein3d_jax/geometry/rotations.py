@@ -25,6 +25,22 @@ def matrix_from_quats(quats: jax.Array) -> jax.Array:
     return jnp.stack([jnp.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def quats_from_matrix(matrix: jax.Array) -> jax.Array:
+    """(..., 3, 3) rotations -> (..., 4) unit wxyz. Of the four ways to write it, the one that divides by the largest
+    component (Shepperd 1978)."""
+    m = [[matrix[..., i, j] for j in range(3)] for i in range(3)]
+    trace = m[0][0] + m[1][1] + m[2][2]
+    products = [  # row k: 4 q_k (w, x, y, z)
+        [1 + trace, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]],
+        [m[2][1] - m[1][2], 1 + 2 * m[0][0] - trace, m[0][1] + m[1][0], m[0][2] + m[2][0]],
+        [m[0][2] - m[2][0], m[0][1] + m[1][0], 1 + 2 * m[1][1] - trace, m[1][2] + m[2][1]],
+        [m[1][0] - m[0][1], m[0][2] + m[2][0], m[1][2] + m[2][1], 1 + 2 * m[2][2] - trace],
+    ]
+    rows = jnp.stack([jnp.stack(row, axis=-1) for row in products], axis=-2)
+    largest = jnp.argmax(jnp.diagonal(rows, axis1=-2, axis2=-1), axis=-1)
+    return normalize_quats(jnp.take_along_axis(rows, largest[..., None, None], axis=-2)[..., 0, :])
+
+
 def multiply_quats(left: jax.Array, right: jax.Array) -> jax.Array:
     """Hamilton product: (..., 4), (..., 4) -> (..., 4); rotates by `right` first."""
     lw, lx, ly, lz = jnp.moveaxis(left, -1, 0)

@@ -1,7 +1,9 @@
 """Panorama + distance -> Gaussians: one splat for each equirectangular pixel (paper Sec. 3.1).
 
-Centre by back-projection, colour from the pixel, isotropic scale from the pixel's footprint on the sphere at its
-distance, identity rotation, high opacity. Everything scales with the distance; nothing here is in absolute metres.
+Centre by back-projection, colour from the pixel, size from the pixel's footprint on the sphere at its distance, high
+opacity. The paper's splats are balls, and gaps open between them where a surface that was seen at a slant is seen from
+elsewhere. Ours lie along the surface, stretched so that from where they were lifted they look as round as balls.
+Everything scales with the distance; nothing here is in absolute metres.
 """
 
 from dataclasses import dataclass
@@ -11,9 +13,12 @@ import jax.numpy as jnp
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.resample import pad_sphere
-from rein3d_jax.geometry.sphere import latitudes, rays_of_pose
+from rein3d_jax.geometry.rotations import quats_from_matrix
+from rein3d_jax.geometry.safe import safe_norm
+from rein3d_jax.geometry.sphere import latitudes, rays_of_pose, world_from_camera_axes
 from rein3d_jax.geometry.spherical_harmonics import sh_from_rgb
 from rein3d_jax.lift.edges import snap_edges
+from rein3d_jax.lift.surface import slopes, surface_axes
 from rein3d_jax.scene import Gaussians, Panorama
 
 
@@ -23,6 +28,8 @@ class LiftConfig:
     stride: int = 1  # lift every stride-th pixel of every stride-th row
     opacity: float = 0.99
     footprint: float = 0.85  # sigma over half the diagonal of a pixel's footprint; see _sigma
+    steepest: float = 6.0  # tangent of incidence up to which a splat is stretched along its surface; 0: never
+    thickness: float = 0.3  # of a splat across its surface, over its width
     snap_edges: bool = True
     # See edges.snap_edges. At 256 x 512, 24 links hold a step blurred by a Gaussian of 3 pixels (4 % of the pixels
     # off both surfaces before, none after; with 16 links still 4 %). The price on exact, furnished rooms of that
@@ -78,15 +85,21 @@ def _lift(
     # One pixel gives ray AND distance, so that its centre stays exactly on the surface at any stride.
     chosen = (slice(stride // 2, None, stride), slice(stride // 2, None, stride))
     alive = (select & known)[chosen].ravel()
-    distance = jnp.where(alive, distance[chosen].ravel(), 1.0)
+    distance_of_all, distance = distance, jnp.where(alive, distance[chosen].ravel(), 1.0)
+    slope = slopes(distance_of_all, known)
+    slope *= jnp.minimum(1.0, config.steepest / jnp.maximum(safe_norm(slope, keepdims=True), 1e-6))
+    axes, tangent = (x[chosen].reshape(-1, *x.shape[2:]) for x in surface_axes(slope, height, width))
     rays = rays_of_pose(world_from_camera, height, width)[chosen].reshape(-1, 3)
     latitude = jnp.repeat(latitudes(height)[chosen[0]], width // stride)
     sigma = _sigma(distance, stride * jnp.pi / height, latitude, config.footprint)
+    along, across = jnp.sqrt(1 + tangent**2), jnp.ones_like(tangent)
+    stretch = jnp.stack([along, across, config.thickness * across], axis=-1)
+    turn = jnp.matmul(world_from_camera[:3, :3], world_from_camera_axes().T, precision=jax.lax.Precision.HIGHEST)
     count = distance.shape[0]
     return Gaussians(
         means=rays * distance[:, None] + world_from_camera[:3, 3],
-        log_scales=jnp.broadcast_to(jnp.log(sigma)[:, None], (count, 3)),
-        quats=jnp.tile(jnp.array([1.0, 0.0, 0.0, 0.0]), (count, 1)),
+        log_scales=jnp.log(sigma[:, None] * stretch),
+        quats=quats_from_matrix(jnp.matmul(turn, axes, precision=jax.lax.Precision.HIGHEST)),
         opacity_logits=jnp.full(count, jnp.log(config.opacity / (1 - config.opacity))),
         sh=sh_from_rgb(_box_colour(panorama.rgb, stride)[chosen].reshape(-1, 1, 3)),
         alive=alive,

@@ -47,6 +47,19 @@ def finished(recipe, rooms, tmp_path_factory):
     return folder, result
 
 
+def test_the_main_jobs_scene_is_measured_like_the_others_and_not_made_twice(recipe, rooms, tmp_path, capsys):
+    options = ["--methods", "refined", "--limit", "1", "--protocol", "novel-views,no-reference"]
+    short = ["refine.steps=2", "refine.crop=32", "refine.batch=1", "refine.sh_degree=0"]
+    options += [word for setting in short for word in ("--set", setting)]
+    code, result = run(recipe, rooms, tmp_path, *options)
+    assert code == 0 and capsys.readouterr().out.count("found finished") >= 5  # by the second protocol
+    for protocol in ("novel_views", "no_reference"):
+        refined = result[protocol]["refined"]
+        assert refined["gaussians"]["mean"] > 0 and refined["seconds"]["mean"] > 0
+        assert 0 < refined["coverage"]["mean"] <= 1
+    assert result["novel_views"]["refined"]["psnr"]["mean"] > 5  # black would have less
+
+
 def test_layout(finished):
     result = finished[1]
     assert result["rooms"] == ["room2", "room10"] and result["recipe"] == "tiny" and result["seeds"] == {"seed": 0}

@@ -63,7 +63,7 @@ def finished(recipe, tmp_path_factory):
 
 
 def test_writes_everything_a_user_was_promised(finished):
-    names = {"scene.ply", "flythrough.mp4", "report.html", "metrics.json", "config.toml", "stages"}
+    names = {"scene.ply", "viewer.html", "flythrough.mp4", "report.html", "metrics.json", "config.toml", "stages"}
     assert {path.name for path in finished.iterdir()} == names
 
 

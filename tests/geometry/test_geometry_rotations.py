@@ -5,7 +5,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from rein3d_jax.geometry.covariance import scaled_axes
-from rein3d_jax.geometry.rotations import matrix_from_quats, multiply_quats, normalize_quats, yaw_quat
+from rein3d_jax.geometry.rotations import (
+    matrix_from_quats,
+    multiply_quats,
+    normalize_quats,
+    quats_from_matrix,
+    yaw_quat,
+)
 from rein3d_jax.geometry.safe import safe_divide, safe_norm
 
 ATOL = 1e-5  # float32 through products of two 3 x 3 matrices of quadratic terms
@@ -55,6 +61,13 @@ def test_scaled_axes_square_to_the_covariance() -> None:
     covariance = axes @ axes.swapaxes(-1, -2)
     expected = np.exp(2 * np.sort(np.asarray(log_scales), axis=-1))
     np.testing.assert_allclose(np.linalg.eigvalsh(covariance), expected, rtol=1e-3, atol=ATOL)  # e^6 between the ends
+
+
+def test_a_matrix_gives_back_its_quaternion() -> None:
+    """Up to sign; half turns about the axes included, where w is 0."""
+    quats = normalize_quats(jnp.concatenate([jax.random.normal(jax.random.key(8), (100, 4)), jnp.eye(4)]))
+    dot = jnp.sum(quats * quats_from_matrix(matrix_from_quats(quats)), axis=-1)
+    np.testing.assert_allclose(jnp.abs(dot), 1, atol=1e-6)  # float32
 
 
 def test_safe_functions_at_and_off_their_singular_point() -> None:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.poses import invert, rigid, upright
+from rein3d_jax.geometry.rotations import matrix_from_quats
 from rein3d_jax.geometry.sphere import pixel_rays, pixels_from_rays, world_from_camera_axes
 from rein3d_jax.geometry.spherical_harmonics import rgb_from_sh
 from rein3d_jax.lift.lift import LiftConfig, lift
@@ -17,6 +18,7 @@ from rein3d_jax.scene import Gaussians, Panorama
 HEIGHT, WIDTH = 8, 16
 ORIGIN = rigid(world_from_camera_axes(), jnp.zeros(3))
 EVERY = jnp.ones((HEIGHT, WIDTH), bool)
+BALLS = LiftConfig(steepest=0.0, thickness=1.0)
 
 
 def panorama(seed: int = 0, height: int = HEIGHT) -> Panorama:
@@ -61,7 +63,9 @@ def test_yawed_panorama_gives_a_yawed_scene() -> None:
         return np.roll(np.asarray(leaf).reshape(HEIGHT, WIDTH, -1), columns, axis=1)
 
     np.testing.assert_allclose(np.asarray(there.means).reshape(HEIGHT, WIDTH, 3), grid(here.means) @ left.T, atol=1e-6)
-    for name in ("log_scales", "sh", "quats", "opacity_logits"):
+    axes = [matrix_from_quats(splats.quats).reshape(HEIGHT, WIDTH, 3, 3) for splats in (here, there)]
+    np.testing.assert_allclose(axes[1], left @ np.roll(axes[0], columns, axis=1), atol=1e-5)  # float32 quaternions
+    for name in ("log_scales", "sh", "opacity_logits"):
         np.testing.assert_array_equal(
             np.asarray(getattr(there, name)).reshape(HEIGHT, WIDTH, -1), grid(getattr(here, name))
         )
@@ -77,7 +81,7 @@ def test_scene_scales_with_the_distance(factor: float) -> None:
 
 def test_scales_follow_the_footprint() -> None:
     pano = panorama()
-    sigma = np.exp(np.asarray(lift(pano, ORIGIN, EVERY).log_scales))
+    sigma = np.exp(np.asarray(lift(pano, ORIGIN, EVERY, config=BALLS).log_scales))
     assert np.all(sigma == sigma[:, :1])  # isotropic
     per_metre = sigma[:, 0].reshape(HEIGHT, WIDTH) / np.asarray(pano.distance)
     rows = per_metre[:, 0]
@@ -103,7 +107,7 @@ def test_floor_has_no_holes_up_to_the_pole() -> None:
     up = np.asarray(pixel_rays(height, 2 * height))[..., 2]
     below = jnp.asarray(up < -0.2)
     pano = panorama(height=height).replace(distance=jnp.asarray(1.6 / np.maximum(-up, 0.01)))
-    splats = jax.tree.map(lambda leaf: leaf[below.ravel()], lift(pano, ORIGIN, below))
+    splats = jax.tree.map(lambda leaf: leaf[below.ravel()], lift(pano, ORIGIN, below, config=BALLS))
     corner = (np.arange(18, height)[:, None] / height - 0.5) * np.pi  # between rows, between columns
     turn = np.arange(0, 2 * np.pi, np.pi / 8)
     rays = np.stack([np.cos(corner) * np.cos(turn), np.cos(corner) * np.sin(turn), -np.sin(corner) + 0 * turn], -1)

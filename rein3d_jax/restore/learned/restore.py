@@ -25,16 +25,18 @@ def restore_learned(
 ) -> Video:
     """A restorer once all keywords are bound. Frame 0 is the anchor; rows are learned.config.rows times a power of 2.
 
-    Colour and distance of every pixel of alpha below `observed` are the network's; those above return as rendered, up
-    to a soft border. One step gives the mean of what may be there and uses no randomness; more of them draw a sample,
+    The colour of every pixel of alpha below `observed` is the network's; those above return as rendered, up to a soft
+    border. Distance is the background fill's: the network mixes surfaces at a hole's edges, and what is lifted there
+    floats (distance error of the refined scene 0.157 against 0.077, mean of 8 rooms).
+
+    One step gives the mean of what may be there and uses no randomness; more of them draw a sample,
     from a network that was trained with noise.
     """
     clip = clip_of(video, observed=observed, background=background)
     padded = jax.tree.map(partial(_padded, count=-len(clip.alpha) % GROUP), clip)
     drawn = sample(key, learned, padded, steps)[: len(clip.alpha)]
     rgb = keep_observed(jnp.clip(drawn[..., :3], 0.0, 1.0), video.rgb, video.alpha, observed=observed)
-    known = (video.alpha >= observed) & (video.distance > 0)
-    return video.replace(rgb=rgb, distance=jnp.where(known, video.distance, jnp.exp(drawn[..., 3])))
+    return video.replace(rgb=rgb, distance=clip.fill_distance[..., 0])
 
 
 def _padded(frames: jax.Array, count: int) -> jax.Array:

@@ -1,0 +1,54 @@
+"""Which way the surface runs at each pixel of a panorama, and the splat's axes that follow it.
+
+Over a plane, inverse distance is linear in the direction of the ray, so the surface's slope
+
+    w = gradient of log(distance) over the sphere, per radian        (|w| = tangent of the angle of incidence)
+
+is exact there. Slopes are limited (van Leer 1977): beside a depth edge the step on the far side does not count, and
+across a crease there is none.
+"""
+
+import jax
+import jax.numpy as jnp
+
+from rein3d_jax.geometry.resample import pad_sphere
+from rein3d_jax.geometry.safe import safe_norm
+from rein3d_jax.geometry.sphere import azimuths, horizontal_direction, latitudes, pixel_rays
+
+
+def slopes(distance: jax.Array, known: jax.Array) -> jax.Array:
+    """(h, w, 2) of distances (h, w): w towards growing columns, and upward. 0 beside what is not known."""
+    height = distance.shape[0]
+    inverse = jnp.where(known, 1 / jnp.where(known, distance, 1.0), 0.0)
+    image = pad_sphere(jnp.stack([inverse, known.astype(inverse.dtype)], axis=-1), 1)
+    right = _limited(image[1:-1, :-2], image[1:-1, 1:-1], image[1:-1, 2:])
+    up = _limited(image[2:, 1:-1], image[1:-1, 1:-1], image[:-2, 1:-1])
+    pitch = jnp.pi / height
+    per_radian = jnp.stack([right / (pitch * jnp.cos(latitudes(height))[:, None]), up / pitch], axis=-1)
+    return -per_radian * jnp.where(known, distance, 1.0)[..., None]
+
+
+def _limited(before: jax.Array, here: jax.Array, after: jax.Array) -> jax.Array:
+    """Step of [..., 0] from pixel to pixel: the central one, but at most twice each side's."""
+    first, second = (here - before)[..., 0], (after - here)[..., 0]
+    least = jnp.minimum(jnp.abs(first + second) / 2, 2 * jnp.minimum(jnp.abs(first), jnp.abs(second)))
+    agree = (first * second > 0) & (before[..., 1] * here[..., 1] * after[..., 1] == 1)
+    return jnp.where(agree, jnp.sign(first) * least, 0.0)
+
+
+def surface_axes(slope: jax.Array, height: int, width: int) -> tuple[jax.Array, jax.Array]:
+    """((h, w, 3, 3) orthonormal axes as columns, in a panorama's own frame; (h, w) tangent of incidence).
+
+    The first axis runs along the surface where it falls away most, the second across it, the third is its normal. Seen
+    from the panorama's centre, a disc stretched along the first by sqrt(1 + tangent^2) looks round.
+    """
+    steep = safe_norm(slope)
+    some = steep > 1e-6
+    way = jnp.where(some[..., None], slope / jnp.where(some, steep, 1.0)[..., None], jnp.array([1.0, 0.0]))
+    ray, azimuth, latitude = pixel_rays(height, width), azimuths(width), latitudes(height)[:, None, None]
+    right = jnp.broadcast_to(horizontal_direction(azimuth + jnp.pi / 2), ray.shape)
+    up = jnp.cos(latitude) * jnp.array([0.0, 0.0, 1.0]) - jnp.sin(latitude) * horizontal_direction(azimuth)
+    along = way[..., :1] * right + way[..., 1:] * up
+    first = (along + steep[..., None] * ray) / jnp.sqrt(1 + steep**2)[..., None]
+    second = jnp.cross(ray, along)
+    return jnp.stack([first, second, jnp.cross(first, second)], axis=-1), steep
