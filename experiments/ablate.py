@@ -1,6 +1,7 @@
 """Train the learned restorer in several variants, each with several seeds, and compare what they restore.
 
-    python -m experiments.ablate --config experiments/recipes/ablate_restorer.toml --json FILE [--set key=value ...]
+    python -m experiments.ablate --config experiments/recipes/ablate_restorer.toml --json FILE [--picture PNG]
+        [--set key=value ...]
 
 The recipe is that of experiments.train_restore, and a table more:
 
@@ -24,6 +25,7 @@ from time import perf_counter
 import jax
 import numpy as np
 
+from experiments.ablation_chart import ablation_chart
 from experiments.compile_cache import use_compile_cache
 from experiments.config import config_from, read_recipe
 from experiments.example_store import ExampleStore
@@ -51,6 +53,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m experiments.ablate", description=__doc__.splitlines()[0])
     parser.add_argument("--config", required=True, help="a recipe with a table [ablation]")
     parser.add_argument("--json", required=True, metavar="FILE", help="where to write the figures")
+    parser.add_argument("--picture", metavar="PNG", help="draw gain against seconds, by sampler steps")
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="change one key of the recipe")
     options = parser.parse_args(arguments)
     use_compile_cache()
@@ -61,6 +64,8 @@ def main(arguments: list[str] | None = None) -> int:
         configs = {name: config_from(TrainConfig, recipe, changes) for name, changes in jobs.items()}
         rows = {name: _scores(name, config, ablation) for name, config in configs.items()}
         write_text(options.json, json.dumps({"config": recipe, "variants": rows}, indent=1) + "\n")
+        if options.picture is not None:
+            ablation_chart(rows, ablation.sampler_steps, Path(options.picture))
     except InputError as error:
         print(f"ablate: {error}", file=sys.stderr)
         return 2

@@ -31,7 +31,7 @@ HOMES = {
     "trimesh": ("rein3d_jax/io/mesh_file.py",),
     "PIL": ("rein3d_jax/io/mesh_file.py", "rein3d_jax/io/gltf_header.py"),  # trimesh's pictures
     "safetensors": ("rein3d_jax/io/safetensors_folder.py",),
-    "matplotlib": ("experiments/evaluation/chart.py",),
+    "matplotlib": ("experiments/evaluation/chart.py", "experiments/ablation_chart.py"),
     "array_record": ("rein3d_jax/io/pair_shard.py",),
     "grain": ("experiments/pair_batches.py",),
     "ray": ("experiments/ray_workers.py",),
