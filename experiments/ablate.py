@@ -74,7 +74,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _ablation(table, recipe: str) -> Ablation:
     try:
-        made = Ablation(**table)
+        made = Ablation(**(table or {}))
         return dataclasses.replace(made, seeds=tuple(made.seeds), sampler_steps=tuple(made.sampler_steps))
     except TypeError as error:
         raise InputError(f"{recipe}: [ablation] needs a table `variants`, and takes seeds and sampler_steps") from error
