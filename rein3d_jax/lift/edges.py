@@ -7,9 +7,9 @@ A ramp is where the slope between neighbours has a PEAK narrower than `ramp` pix
 steady slope, a crease between planes goes from one slope to another: neither is a peak. The morphological opening of
 |slope| keeps everything but peaks (a monotone |slope| is kept exactly), so what it removes is the step itself.
 
-A table's top seen nearly edge-on is a peak too, and no ramp. What tells them apart is the map as a whole: blur leaves no
-step of a single link, so a map that has such steps was rendered, and stays as it is; in a blurred one the ramps are about
-as wide as each other: peaks half as wide again as those that do half of all the climbing stay.
+A table's top seen nearly edge-on is a peak too, and no ramp. What tells them apart is the map as a whole: blur leaves
+no step of a single link, so a map that has such steps was rendered, and stays as it is; in a blurred one the ramps are
+about as wide as each other: peaks half as wide again as those that do half of all the climbing stay.
 """
 
 import jax
