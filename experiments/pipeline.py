@@ -1,7 +1,6 @@
 """The stages joined: one panorama in, one refined scene out. Pure of files; `reconstruct` reads, saves and resumes."""
 
 import dataclasses
-from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
@@ -136,18 +135,20 @@ def room_background(panorama: Panorama, config: RestoreConfig) -> Background | N
 
 
 def collect_views(panorama: Panorama, videos: list[Video], *, stages: Stages) -> Views:
-    """Perspective views of the input panorama and of every restored frame but the origin's, weighed by trust."""
+    """Views of the input panorama and of every restored frame but the origin's, weighed by trust. Only the input's have
+    a distance to fit: what a frame shows was rendered or guessed."""
     config, whole = stages.refine, jnp.ones(panorama.distance.shape)
-    parts = [
-        views_from_panorama(panorama.rgb, config.observed_weight * whole, origin_pose(), turn=turn, config=config)
-        for turn in (0.0, jnp.pi / 4)
-    ]
-    for video in videos:
+    known = jnp.where(panorama.valid, panorama.distance, 0.0)
+    of_input = (panorama.rgb, config.observed_weight * whole, known, origin_pose())
+    turns = (0.0,) if config.panoramic else (0.0, jnp.pi / 4)
+    parts = [views_from_panorama(*of_input, source=0, turn=turn, config=config) for turn in turns]
+    for source, video in enumerate(videos, start=1):
         weight = jnp.where(video.alpha >= stages.restore.observed, config.observed_weight, config.restored_weight)
         weight = jnp.where(video.distance > 0, weight, 0.0)
         for index in range(1, video.rgb.shape[0]):
-            pose, turn = video.world_from_camera[index], (index * GOLDEN_TURN) % (jnp.pi / 2)
-            parts.append(views_from_panorama(video.rgb[index], weight[index], pose, turn=float(turn), config=config))
+            pose, turn = video.world_from_camera[index], float((index * GOLDEN_TURN) % (jnp.pi / 2))
+            frame = (video.rgb[index], weight[index], jnp.zeros_like(weight[index]), pose)
+            parts.append(views_from_panorama(*frame, source=source, turn=turn, config=config))
     return join_views(*parts)
 
 
@@ -157,14 +158,8 @@ def scene_extent(panorama: Panorama) -> float:
 
 
 def refine_scene(
-    scene: Gaussians,
-    views: Views,
-    extent: float,
-    key: jax.Array,
-    *,
-    stages: Stages,
-    on_step: Callable[[int], None] = lambda step: None,
+    scene: Gaussians, views: Views, extent: float, key: jax.Array, *, stages: Stages, **options
 ) -> tuple[Gaussians, dict]:
-    """The refined scene and its curves (paper Sec. 3.3)."""
+    """The refined scene and its curves (paper Sec. 3.3); `options` are `refine`'s."""
     scene = compact(scene, spare=stages.refine.spare)
-    return refine(scene, views, extent, key, config=stages.refine, raster=stages.rasterize, on_step=on_step)
+    return refine(scene, views, extent, key, config=stages.refine, raster=stages.rasterize, **options)

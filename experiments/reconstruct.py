@@ -49,6 +49,7 @@ from rein3d_jax.explore.trajectories import Trajectories, radial_trajectories
 from rein3d_jax.io.atomic import write_text
 from rein3d_jax.io.ply import write_ply
 from rein3d_jax.io.video import write_mp4
+from rein3d_jax.refine import STOPPED, blank_snapshot
 from rein3d_jax.scene import Gaussians, Panorama, Video
 
 PACKAGES = ("rein3d-jax", "jax", "jaxlib", "flax", "optax", "numpy", "opencv-contrib-python-headless", "OpenImageIO")
@@ -140,13 +141,13 @@ def _stages(config: ReconstructConfig, files: str, store: StageStore, progress: 
     def refine_all():
         chosen = collect_views(panorama, videos, stages=config)
         refine_key = jax.random.fold_in(key, 1)
-        scene, curves = refine_scene(
-            last.scene, chosen, scene_extent(panorama), refine_key, stages=config, on_step=progress.step
-        )
-        return scene, {name: np.asarray(value, np.float64) for name, value in curves.items()}
+        arguments = (last.scene, chosen, scene_extent(panorama), refine_key)
+        start = store.kept(blank_snapshot(config.refine))
+        return refine_scene(*arguments, stages=config, on_step=progress.step, start=start, on_look=store.keep)
 
-    like = (BLANK_SCENE(), {name: np.zeros(0) for name in CURVES})
-    refined, curves = store.run("refine", table["refine"], like, refine_all)
+    refined, curves = store.run(
+        "refine", table["refine"], (BLANK_SCENE(), blank_snapshot(config.refine).curves), refine_all
+    )
     origin = inputs.FITTED if bool(fitted[0]) else inputs.GIVEN
     overflow = {
         "explore.max_frames": int(trajectories.overflow.sum()),
@@ -169,9 +170,6 @@ def _restored(config, table, store: StageStore, panorama, coarse, trajectories, 
         depends = [table["restore"], weights, table["rasterize"], config.seed, index]
         last = store.run(f"restore-{index:02d}", depends, _blank_restored(), restore_next)
         yield last
-
-
-CURVES = ("loss", "psnr", "count", "overflow", "reallocated", "skipped")
 
 
 def _read(config: ReconstructConfig):
@@ -216,6 +214,7 @@ def _write(config, output, views, store, progress, started, panorama, origin, co
         "overflows": overflow,
         "reallocated": int(curves["reallocated"]),
         "skipped_steps": int(curves["skipped"]),
+        "stopped": {"refine": STOPPED[int(curves["stopped"])]},
         "distance": origin,
     }
     if views:

@@ -4,12 +4,15 @@ from dataclasses import dataclass
 
 from rein3d_jax.errors import InputError
 
+DENSIFICATIONS = ("default", "mcmc")
+
 
 @dataclass(frozen=True)
 class RefineConfig:
     steps: int = 15_000
     batch: int = 4  # views a step
-    crop: int = 512  # pixels a side of a perspective view
+    panoramic: bool = False  # fit to whole panoramas weighed by solid angle, not to perspective views of them
+    crop: int = 512  # pixels a side of a perspective view, or rows of a panorama
     fov: float = 90.0  # degrees; six of 90 tile the sphere
     test_every: int = 16  # every 16th view is held out
     evaluate_every: int = 5_000  # steps between looks at the held-out views
@@ -21,6 +24,11 @@ class RefineConfig:
     ssim_weight: float = 0.2
     observed_weight: float = 1.0  # of a pixel that the input saw
     restored_weight: float = 0.5  # of a pixel that was guessed
+    distance_weight: float = 0.0  # of |log distance| off the input's, where the input saw
+    opacity_weight: float = 0.0  # of the mean opacity; with "mcmc" its authors take 0.01
+    scale_weight: float = 0.0  # of the mean scale, in extents; likewise 0.01
+    # Rate of each trajectory's colour affine, so that guesses that disagree in tint do not blur each other; 0: none.
+    colour_rate: float = 0.0
     means_rate: float = 1.6e-4  # times the scene's extent, decaying to means_rate_end of it
     means_rate_end: float = 0.01
     scales_rate: float = 5e-3
@@ -28,6 +36,11 @@ class RefineConfig:
     quats_rate: float = 1e-3
     sh_rate: float = 2.5e-3
     sh_rest_rate: float = 1.25e-4
+    steps_at_once: int = 1  # steps in one compiled scan; more spares an accelerator the waits between them
+    plateau: float = 0.0  # dB; stop when `patience` looks in a row brought less. 0: never
+    patience: int = 2
+    densification: str = "default"  # clone and split by gradient (3DGS); or "mcmc", relocation under a hard cap
+    noise: float = 5e5  # of "mcmc": steers exploration (Kheradmand et al. 2024, their noise_lr)
     spare: float = 1.0  # free slots for densification, as a share of the Gaussians it starts with
     densify_start: int = 500
     densify_stop: int = 13_000
@@ -40,9 +53,12 @@ class RefineConfig:
     reset_every: int = 3_000
 
     def __post_init__(self):
-        for name in ("steps", "evaluate_every", "sh_degree_every", "densify_every", "reset_every"):
+        for name in ("steps", "evaluate_every", "sh_degree_every", "densify_every", "reset_every",
+                     "steps_at_once", "patience"):  # fmt: skip
             if getattr(self, name) < (0 if name == "steps" else 1):
                 raise InputError(f"refine.{name} {getattr(self, name)} is too small")
+        if self.densification not in DENSIFICATIONS:
+            raise InputError(f'refine.densification "{self.densification}" must be one of {", ".join(DENSIFICATIONS)}')
         if self.crop < 16 or self.batch < 1 or self.test_every < 2:
             raise InputError("refine.crop must be at least 16, refine.batch at least 1, refine.test_every at least 2")
         if not 0 <= self.sh_degree <= 3:

@@ -2,16 +2,17 @@
 
 import jax
 import jax.numpy as jnp
+import optax
 
 from rein3d_jax.geometry.rotations import matrix_from_quats
 from rein3d_jax.refine.config import RefineConfig
-from rein3d_jax.refine.step import RefineState
+from rein3d_jax.refine.state import RefineState
 
 SHRINK = 1.6  # a split Gaussian's children have 1/1.6 of its scale (3DGS)
 RESET_OPACITY = 0.01  # 3DGS: twice the pruning threshold and a little more, so a reset alone prunes nothing
 
 
-def _forget(optimizer, slots):
+def forget(optimizer: optax.OptState, slots: jax.Array) -> optax.OptState:
     """Zero the moments of `slots` (n,) bool: what a recycled slot remembers belongs to another Gaussian."""
     count = slots.shape[0]
 
@@ -64,7 +65,7 @@ def _densify(state: RefineState, extent: jax.Array, key: jax.Array, *, config: R
     zeros = jnp.zeros(count)
     counts = {"added": placed.sum(), "pruned": pruned.sum(), "overflow": (steepest > 0).sum() - placed.sum()}
     new = state.replace(
-        parameters=grown, alive=alive & ~pruned, floor=floor, optimizer=_forget(state.optimizer, fresh | pruned),
+        parameters=grown, alive=alive & ~pruned, floor=floor, optimizer=forget(state.optimizer, fresh | pruned),
         gradient_sum=zeros, seen=zeros,
     )  # fmt: skip
     return new, counts
@@ -81,7 +82,7 @@ def _reset_opacity(state: RefineState) -> RefineState:
     ceiling = jnp.log(RESET_OPACITY / (1 - RESET_OPACITY))
     logits = jnp.minimum(state.parameters["opacity_logits"], ceiling)
     inner = dict(state.optimizer.inner_states)
-    inner["opacity_logits"] = _forget(inner["opacity_logits"], jnp.ones_like(state.alive))
+    inner["opacity_logits"] = forget(inner["opacity_logits"], jnp.ones_like(state.alive))
     optimizer = state.optimizer._replace(inner_states=inner)
     return state.replace(parameters=state.parameters | {"opacity_logits": logits}, optimizer=optimizer)
 

@@ -14,7 +14,7 @@ from rein3d_jax.rasterize import RasterizeConfig, rasterize
 from rein3d_jax.refine import RefineConfig, Views
 from rein3d_jax.scene import Gaussians
 
-COUNT, SPARE, SIZE, VIEWS = 40, 20, 16, 12
+COUNT, SPARE, SIZE, VIEWS, SOURCES = 40, 20, 16, 12, 3
 # Roomier than `refine` would ask for, so that it keeps these buffers and the tests share one compiled step.
 RASTER = RasterizeConfig(visible_capacity=96, row_capacity=256, pair_capacity=512, chunk_capacity=128)
 CONFIG = RefineConfig(
@@ -45,7 +45,8 @@ def make_views(scale: float = 1.0) -> Views:
     rgb = jnp.stack([rasterize(make_scene(scale), camera, config=RASTER).rgb for camera in cameras])
     poses = jnp.stack([camera.world_from_camera for camera in cameras])
     focal = jnp.full(VIEWS, focal_from_fov(np.pi / 2, SIZE), jnp.float32)
-    return Views(rgb, jnp.ones((VIEWS, SIZE, SIZE)), poses, focal)
+    ones = jnp.ones((VIEWS, SIZE, SIZE))
+    return Views(rgb, ones, jnp.zeros_like(ones), poses, focal, jnp.arange(VIEWS, dtype=jnp.int32) % SOURCES)
 
 
 def blurred(scene: Gaussians) -> Gaussians:

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from rein3d_jax.refine.densify import RESET_OPACITY, SHRINK, densify, reset_opacity
-from rein3d_jax.refine.step import RefineState, initial_state
+from rein3d_jax.refine.state import RefineState, initial_state
 
 EXTENT = 2.0
 KEY = jax.random.key(0)

@@ -4,19 +4,26 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from rein3d_jax.refine.step import initial_state, step
+from rein3d_jax.refine.state import initial_state
+from rein3d_jax.refine.step import steps
 
 BLACK = jnp.zeros(3)
 
 
-def first(views, count: int = 2):
-    return jax.tree.map(lambda x: x[1 : 1 + count], views)
+KEY = jax.random.key(0)
+FIRST = jnp.array([[1, 2]])
+
+
+def step(state, views, extent, *, config, raster):
+    """One step on views 1 and 2, before black."""
+    state, metrics = steps(state, views, FIRST, BLACK[None], extent, KEY, config=config, raster=raster)
+    return state, jax.tree.map(lambda x: x[0], metrics)
 
 
 def test_a_step_moves_what_is_seen_and_stays_finite(toy, config, raster) -> None:
     _, views, start = toy()
-    state = initial_state(start, config)
-    new, metrics = step(state, first(views), 2.0, BLACK, config=config, raster=raster)
+    state = initial_state(start, config, sources=3)
+    new, metrics = step(state, views, 2.0, config=config, raster=raster)
     assert not metrics["skipped"] and int(metrics["overflow"]) == 0 and int(new.step) == 1
     assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(new))
     moved = np.any(np.asarray(new.parameters["sh"] != state.parameters["sh"]), axis=(1, 2))
@@ -27,10 +34,9 @@ def test_a_step_moves_what_is_seen_and_stays_finite(toy, config, raster) -> None
 
 def test_a_batch_without_finite_gradient_changes_nothing_and_is_counted(toy, config, raster) -> None:
     _, views, start = toy()
-    state = initial_state(start, config)
-    batch = first(views)
-    batch = batch.replace(rgb=batch.rgb.at[1, 7, 7, 0].set(jnp.nan))
-    new, metrics = step(state, batch, 2.0, BLACK, config=config, raster=raster)
+    state = initial_state(start, config, sources=3)
+    batch = views.replace(rgb=views.rgb.at[2, 7, 7, 0].set(jnp.nan))
+    new, metrics = step(state, batch, 2.0, config=config, raster=raster)
     assert metrics["skipped"] and int(new.step) == 1
     for before, after in zip(jax.tree.leaves(state.replace(step=new.step)), jax.tree.leaves(new), strict=True):
         np.testing.assert_array_equal(before, after)
@@ -41,8 +47,8 @@ def test_a_step_does_not_depend_on_the_unit_of_length(toy, config, raster) -> No
     scale, states = 10.0, []
     for factor in (1.0, scale):
         _, views, start = toy(factor)
-        state = initial_state(start, config)
-        states.append(step(state, first(views), 2.0 * factor, BLACK, config=config, raster=raster)[0].parameters)
+        state = initial_state(start, config, sources=3)
+        states.append(step(state, views, 2.0 * factor, config=config, raster=raster)[0].parameters)
     small, large = states
     comparable = large | {"means": large["means"] / scale, "log_scales": large["log_scales"] - np.log(scale)}
     rates = {
