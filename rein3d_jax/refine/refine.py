@@ -134,7 +134,7 @@ def _advance(run, state, arguments, config, raster, curves):
         raster, curves = _grow(raster, jnp.max(metrics["needed"], axis=0), curves)
     numbers = np.arange(int(state.step), int(new.step)) + 1
     losses = np.stack([numbers, np.asarray(metrics["loss"])], axis=-1)
-    skipped = curves["skipped"] + np.sum(metrics["skipped"])
+    skipped = curves["skipped"] + np.sum(np.asarray(metrics["skipped"]))
     return new, raster, curves | {"loss": np.concatenate([curves["loss"], losses]), "skipped": skipped}
 
 

@@ -17,6 +17,7 @@ from rein3d_jax.io.checkpoint import load
 from rein3d_jax.io.image import write_rgb
 from rein3d_jax.io.ply import read_ply
 from rein3d_jax.rasterize import RasterizeConfig, render
+from rein3d_jax.refine import RefineConfig, blank_snapshot
 
 RECIPE = """
 [input]
@@ -99,7 +100,7 @@ def _refine_like(output):
     key = np.zeros(0, np.uint8)
     return {
         "key": key,
-        "result": (job.BLANK_SCENE(), {n: np.zeros(0) for n in job.CURVES}),
+        "result": (job.BLANK_SCENE(), blank_snapshot(RefineConfig()).curves),
         "seconds": np.float64(0),
     }
 
@@ -129,9 +130,32 @@ def test_killed_and_resumed_gives_the_same_bytes(finished, recipe, tmp_path, mon
     save = job.StageStore.__init__.__globals__["save"]
     monkeypatch.setitem(job.StageStore.__init__.__globals__, "save", lambda p, t: (made.append(p.stem), save(p, t)))
     assert job.main(["--config", str(recipe), "--output", str(output), "--resume", "--set", "input.views=none"]) == 0
-    assert made == stages[finished_stages:]
+    assert [name for name in made if name != "unfinished"] == stages[finished_stages:]
     for name in ("scene.ply", "flythrough.mp4"):
         assert (output / name).read_bytes() == (finished / name).read_bytes(), name
+
+
+def test_killed_while_refining_and_resumed_gives_the_same_bytes(finished, recipe, tmp_path, monkeypatch):
+    """Killed after the second look; what was kept there is read again, once."""
+    output = tmp_path / "room"
+    shutil.copytree(finished / "stages", output / "stages")
+    (output / "stages" / "refine.npz").unlink()
+    again = ["--config", str(recipe), "--output", str(output), "--resume", "--set", "input.views=none"]
+    keep, kept = job.StageStore.keep, []
+
+    def killed(store, part):
+        keep(store, part)
+        kept.append(int(part.state.step))
+        if len(kept) == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(job.StageStore, "keep", killed)
+    with pytest.raises(KeyboardInterrupt):
+        job.main(again)
+    assert job.main(again) == 0
+    assert kept[0] == 0 and kept[1] > 0 and all(step > kept[1] for step in kept[2:])
+    assert (output / "scene.ply").read_bytes() == (finished / "scene.ply").read_bytes()
+    assert not (output / "stages" / "unfinished.npz").exists()
 
 
 def test_resume_makes_again_what_another_config_made(finished, recipe, tmp_path, monkeypatch):
@@ -143,7 +167,7 @@ def test_resume_makes_again_what_another_config_made(finished, recipe, tmp_path,
     options = ["--config", str(recipe), "--output", str(output), "--resume", "--set", "refine.steps=2"]
     options += ["--set", "input.views=none"]
     assert job.main(options) == 0
-    assert made == ["refine"]
+    assert made == ["unfinished", "refine"]  # one look, at the start
 
 
 def _bad(tmp_path, name):
