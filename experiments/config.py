@@ -7,6 +7,7 @@ A config checks its own ranges in `__post_init__`: it raises InputError("steps m
 
 import dataclasses
 import difflib
+import hashlib
 import json
 import math
 import reprlib
@@ -53,6 +54,11 @@ def read_recipe(path: str | Path) -> dict:
         raise InputError(f"{path}: the recipe cannot be read ({error.strerror}); check --config") from error
     except ValueError as error:  # TOML at fault (the message ends with the line), or not UTF-8
         raise InputError(f"{path}: not a TOML recipe: {error}") from error
+
+
+def recipe_digest(path: Path) -> str:
+    """What tells a result's recipe from another: the hash of its file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _override(text: str) -> dict:

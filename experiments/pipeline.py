@@ -4,6 +4,7 @@ import dataclasses
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from flax import struct
 
 from rein3d_jax.depth.complete import CompleteConfig
@@ -16,6 +17,8 @@ from rein3d_jax.geometry.sphere import rays_of_pose, world_from_camera_axes
 from rein3d_jax.lift import LiftConfig, compact, lift, merge, with_capacity
 from rein3d_jax.rasterize import RasterizeConfig, allocate, enlarge, render
 from rein3d_jax.refine import RefineConfig, Views, join_views, refine, views_from_panorama
+from rein3d_jax.refine.prune import contribution, prune_to, prune_within
+from rein3d_jax.refine.views import camera_of
 from rein3d_jax.restore import Background, Network, RestoreConfig, background_of, restorer
 from rein3d_jax.scene import Gaussians, Panorama, Video
 
@@ -157,9 +160,26 @@ def scene_extent(panorama: Panorama) -> float:
     return float(jnp.nanmedian(jnp.where(panorama.valid, panorama.distance, jnp.nan)))
 
 
+WEIGHED = 48  # views, evenly through the list, by which a scene is pruned
+
+
+def _needed(scene: Gaussians, views: Views, stages: Stages) -> Gaussians:
+    """What the views need of the scene, within the budget, in a buffer with room to grow."""
+    config = stages.refine
+    if config.needless > 0 or 0 < config.most < int(scene.alive.sum()):
+        chosen = np.unique(np.linspace(0, len(views.rgb) - 1, WEIGHED).astype(int))
+        weight = contribution(scene, [camera_of(views, int(i)) for i in chosen], config=stages.rasterize)
+        scene = prune_within(scene, weight, config.needless)
+        scene = prune_to(scene, weight, config.most) if config.most else scene
+    scene = compact(scene, spare=config.spare)
+    if 0 < config.most < scene.alive.shape[0]:
+        scene = jax.tree.map(lambda x: x[: config.most], scene)  # the living come first
+    return scene
+
+
 def refine_scene(
     scene: Gaussians, views: Views, extent: float, key: jax.Array, *, stages: Stages, **options
 ) -> tuple[Gaussians, dict]:
     """The refined scene and its curves (paper Sec. 3.3); `options` are `refine`'s."""
-    scene = compact(scene, spare=stages.refine.spare)
+    scene = _needed(scene, views, stages)
     return refine(scene, views, extent, key, config=stages.refine, raster=stages.rasterize, **options)

@@ -23,7 +23,7 @@ import numpy as np
 
 from experiments import inputs, story
 from experiments.compile_cache import use_compile_cache
-from experiments.config import dump_config, load_config
+from experiments.config import dump_config, load_config, recipe_digest
 from experiments.flythrough import FilmConfig, flythrough
 from experiments.inputs import InputConfig, read_panorama, read_views
 from experiments.pipeline import (
@@ -44,6 +44,7 @@ from experiments.stage_store import StageStore
 from experiments.walkthrough import walkthrough
 from rein3d_jax.depth.room_shell import RoomShellConfig
 from rein3d_jax.errors import InputError
+from rein3d_jax.evaluate.coverage import coverage
 from rein3d_jax.evaluate.report import render_report
 from rein3d_jax.explore.trajectories import Trajectories, radial_trajectories
 from rein3d_jax.io.atomic import write_text
@@ -201,7 +202,7 @@ def _write(config, output, views, store, progress, started, panorama, origin, co
     write_mp4(output / "flythrough.mp4", film, config.film.rate)
     pictures = [render_views(scene, views, backdrop, config=config.rasterize) for scene in (coarse, refined)]
     ends = _ends(trajectories)
-    coarse_ends, refined_ends = (_panoramas(scene, ends, config) for scene in (coarse, refined))
+    (coarse_ends, seen), (refined_ends, covered) = (_panoramas(scene, ends, config) for scene in (coarse, refined))
     metrics = {
         "seconds": {**{k: round(v, 3) for k, v in store.seconds.items()}, "write": 0.0, "total": 0.0},
         "peak_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
@@ -216,6 +217,8 @@ def _write(config, output, views, store, progress, started, panorama, origin, co
         "skipped_steps": int(curves["skipped"]),
         "stopped": {"refine": STOPPED[int(curves["stopped"])]},
         "distance": origin,
+        "recipe": recipe_digest(output / "config.toml"),
+        "coverage": {"coarse": round(seen, 4), "refined": round(covered, 4)},
     }
     if views:
         metrics["quality"] = {n: quality(p, views) for n, p in zip(("coarse", "refined"), pictures, strict=True)}
@@ -236,10 +239,10 @@ def _ends(trajectories: Trajectories) -> jax.Array:
     return jnp.stack([trajectories.world_from_camera[i, int(trajectories.counts[i]) - 1] for i in chosen])
 
 
-def _panoramas(scene: Gaussians, poses: jax.Array, config: ReconstructConfig) -> list[np.ndarray]:
-    """What the scene shows there, holes black."""
+def _panoramas(scene: Gaussians, poses: jax.Array, config: ReconstructConfig) -> tuple[list, float]:
+    """What the scene shows there, holes black; and the share of the sphere that it covers, the poses' mean."""
     video, _ = render_video(scene, poses, config.restore.height, config.rasterize)
-    return list(np.asarray(video.rgb * video.alpha[..., None]))
+    return list(np.asarray(video.rgb * video.alpha[..., None])), float(jnp.mean(coverage(video.alpha)))
 
 
 if __name__ == "__main__":

@@ -1,22 +1,27 @@
 """A run's report: which pictures, numbers and warnings a person should see, in which order."""
 
 import dataclasses
+import json
+from importlib.resources import files
 
 import jax.numpy as jnp
 import numpy as np
 
 from experiments.inputs import FITTED, InputConfig, View
 from experiments.quality import is_novel
+from experiments.sources import sources
 from rein3d_jax.evaluate.chart import Chart, Series
 from rein3d_jax.evaluate.colour_map import colour_map, colour_range
 from rein3d_jax.evaluate.plan import Plan, outline
 from rein3d_jax.evaluate.report import Comparison, Picture, Report, Section, Table
+from rein3d_jax.evaluate.scatter import Mark, Scatter
 from rein3d_jax.explore.profile import ExploreConfig, travel
 from rein3d_jax.explore.trajectories import Trajectories
 from rein3d_jax.io.image import encode_jpeg
 from rein3d_jax.scene import Panorama, Video
 
 SHOWN = 3  # trajectories, and ground-truth positions, that the page shows
+GUESSED, EMPTY = 0.2, 0.01  # of what surrounds the ends of the paths; above these the page warns
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,10 +58,11 @@ def tell(run: Run) -> Report:
         distance_origin=_distance_origin(run),
         warnings=tuple(_warnings(run)),
         parts=tuple(_parts(run)),
-        plan=plan(run),
+        standing=_standing(run.metrics),
+        plan=plan(run.trajectories, run.explore, run.views),
         charts=_charts(run.curves),
         tables=(Table("Where time went", ("Stage", "Seconds"), tuple((k, f"{s:.1f}") for k, s in seconds.items())),),
-        sources=_sources(run.config),
+        sources=sources(run.config.panorama),
     )
 
 
@@ -73,14 +79,33 @@ def _warnings(run: Run):
     metrics = run.metrics
     if run.origin_of_distance == FITTED:
         yield "The distance is a fitted empty room: furniture will look flat from the side. Give --distance for depth."
+        yield (
+            "The scale is a guess: every length follows the height of the camera above the floor. Measure it and give "
+            "it with --set shell.camera_height."
+        )
     unknown = 1 - float(jnp.mean(run.panorama.valid))
     if unknown > 0.001:
         yield f"{unknown:.1%} of the panorama has no known distance (windows, mirrors); it was placed far away."
     if float(jnp.max(run.trajectories.lengths)) < run.explore.step:
         yield "There was no room to move the camera: nothing hidden was revealed. Lower explore.camera_radius."
+    yield from _coverage_warnings(metrics["coverage"])
     for name, number in metrics["overflows"].items():
         if number:
-            yield f"{number} {'frames' if name == 'explore.max_frames' else 'Gaussians'} found no room; raise {name}."
+            kind = "frames" if name == "explore.max_frames" else "Gaussians"
+            yield f"The capacity was reached: {number:,} {kind} found no room and were left out; raise {name}."
+    if metrics["skipped_steps"]:
+        yield f"{metrics['skipped_steps']} refinement steps had values that were not finite, and were skipped."
+
+
+def _coverage_warnings(coverage: dict):
+    guessed = coverage["refined"] - coverage["coarse"]
+    if guessed > GUESSED:
+        yield (
+            f"{guessed:.0%} of what one sees from the ends of the longest paths was hidden from the panorama and is a "
+            "guess. A second panorama taken there would tell."
+        )
+    if (empty := 1 - coverage["refined"]) > EMPTY:
+        yield f"{empty:.0%} of what one sees from the ends of the longest paths is empty: nothing was put there."
 
 
 def _parts(run: Run):
@@ -88,20 +113,38 @@ def _parts(run: Run):
     depth = colour_map(run.panorama.distance, run.panorama.valid, near, far)
     yield Section("What went in", "The panorama, and how far each pixel is.", (_jpeg("panorama", run.panorama.rgb),
                   _jpeg("distance", depth)), scale=(float(near), float(far)), wide=True)  # fmt: skip
-    yield Comparison("Before and after", "Drag: from the end of the longest path, the panorama lifted to 3D alone, "
-                     "and the refined scene.", _jpeg("lifted only: black is unseen", run.coarse[0]),
-                     _jpeg("refined", run.refined[0]))  # fmt: skip
     for order, index in enumerate(longest(run.trajectories)):
-        pictures = [("lifted only: black is unseen", run.coarse[order]), ("restored", run.videos[index].rgb[-1]),
-                    ("refined", run.refined[order])]  # fmt: skip
-        length = float(run.trajectories.lengths[index])
-        yield Section(f"The end of path {index + 1}", f"{length:.1f} m from where the panorama was taken.",
-                      tuple(_jpeg(*p) for p in pictures), wide=True)  # fmt: skip
+        yield _path(run, order, index)
     for index in _shown_views(run):
-        pictures = [("lifted only", run.coarse_views[index]), ("refined", run.refined_views[index]),
-                    ("truth", run.views[index].rgb)]  # fmt: skip
-        yield Section(f"Against the truth: {run.views[index].name}", "A view that the job never saw.",
-                      tuple(_jpeg(*p) for p in pictures))  # fmt: skip
+        yield Comparison(f"Against the truth: {run.views[index].name}", "Drag: a view that the job never saw.",
+                         _jpeg("refined", run.refined_views[index]), _jpeg("truth", run.views[index].rgb),
+                         (_jpeg("lifted only", run.coarse_views[index]),), wide=False)  # fmt: skip
+
+
+def _path(run: Run, order: int, index: int) -> Comparison:
+    length = float(run.trajectories.lengths[index])
+    caption = f"Drag: {length:.1f} m from where the panorama was taken, lifted to 3D alone, and refined."
+    heading = f"Before and after: the end of path {index + 1}"
+    before = _jpeg("lifted only: black is unseen", run.coarse[order])
+    restored = _jpeg("what was guessed there before refining", run.videos[index].rgb[-1])
+    return Comparison(heading, caption, before, _jpeg("refined", run.refined[order]), (restored,))
+
+
+def _standing(metrics: dict) -> Scatter:
+    """This run among the methods measured on rooms with ground truth: accuracy against seconds."""
+    measured = json.loads(files(__package__).joinpath("evaluation", "measured.json").read_text("utf-8"))
+    panel = next(p for p in measured["panels"] if (p["cost"], p["merit"]) == ("seconds", "psnr"))
+    seconds = sum(value for name, value in metrics["seconds"].items() if name not in ("write", "total"))
+    merit = metrics["quality"]["refined"]["psnr"] if "quality" in metrics else None
+    marks = [Mark(point["label"], point["cost"], point["merit"]) for point in panel["points"]]
+    own = "this run" if merit is not None else "this run's seconds (no truth to compare with)"
+    rooms = len(measured["rooms"])
+    caption = (
+        f"The other marks are means over {rooms} traced rooms on two cores of a 2.5 GHz Xeon; this run is one scene on "
+        "your computer, so compare the order of magnitude. Up and to the left is better."
+    )
+    return Scatter("Where this run stands", caption, panel["cost_label"], panel["merit_label"],
+                   (*marks, Mark(own, seconds, merit, own=True)))  # fmt: skip
 
 
 def longest(trajectories: Trajectories) -> list[int]:
@@ -127,13 +170,13 @@ def _jpeg(label: str, rgb) -> Picture:
     return Picture(label, encode_jpeg(np.asarray(rgb)))
 
 
-def plan(run: Run) -> Plan:
-    """The map: walls, where one may walk, and the paths."""
-    t = run.trajectories
+def plan(trajectories: Trajectories, explore: ExploreConfig, views: list[View]) -> Plan:
+    """The map: walls, where one may walk, the paths, and where ground truth was taken."""
+    t = trajectories
     paths = tuple(np.asarray(p[: int(n), :2]) for p, n in zip(t.positions, t.counts, strict=True))
-    places = {tuple(np.round(np.asarray(v.camera.world_from_camera[:2, 3]), 3)) for v in run.views if is_novel(v)}
+    places = {tuple(np.round(np.asarray(v.camera.world_from_camera[:2, 3]), 3)) for v in views if is_novel(v)}
     views = np.array(sorted(places)).reshape(-1, 2)
-    safe = np.asarray(travel(t.safe, config=run.explore))
+    safe = np.asarray(travel(t.safe, config=explore))
     return Plan(outline(np.asarray(t.raw)), outline(safe), paths, views)
 
 
@@ -147,9 +190,3 @@ def _charts(curves: dict) -> tuple[Chart, ...]:
         Chart("PSNR", "step", "dB", series("psnr", "held-out views")),
         Chart("Gaussians", "step", "count", series("count", "alive")),
     )
-
-
-def _sources(config: InputConfig) -> tuple[str, ...]:
-    if not config.panorama.startswith("sample:"):
-        return ("Your own picture.",)
-    return ("A sample that comes with rein3d_jax; its authors and licences are in experiments/samples/SOURCES.md.",)

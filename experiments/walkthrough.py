@@ -16,4 +16,4 @@ def walkthrough(run: Run, coarse: Gaussians, refined: Gaussians, backdrop: jax.A
     scenes = {"Coarse": encode_spz(coarse, "the lifted scene"), "Refined": encode_spz(refined, "the refined scene")}
     panorama = encode_jpeg(np.asarray(run.panorama.rgb))
     look = {"backdrop": np.asarray(backdrop), "filter_variance": filter_variance}
-    return render_viewer(scenes, panorama, plan(run), **look)
+    return render_viewer(scenes, panorama, plan(run.trajectories, run.explore, run.views), **look)

@@ -28,7 +28,8 @@ HOMES = {
     "OpenImageIO": ("rein3d_jax/io/",),
     "av": ("rein3d_jax/io/video.py",),
     "orbax": ("rein3d_jax/io/checkpoint.py", "rein3d_jax/io/training_checkpoint.py"),
-    "trimesh": ("rein3d_jax/io/mesh_file.py",),
+    "trimesh": ("rein3d_jax/io/mesh_file.py", "rein3d_jax/io/surface_mesh.py"),  # reads, writes
+    "skimage": ("rein3d_jax/io/surface_mesh.py",),
     "PIL": ("rein3d_jax/io/mesh_file.py", "rein3d_jax/io/gltf_header.py"),  # trimesh's pictures
     "safetensors": ("rein3d_jax/io/safetensors_folder.py",),
     "matplotlib": ("experiments/evaluation/chart.py", "experiments/ablation_chart.py"),

@@ -12,6 +12,7 @@ from typing import Any
 from rein3d_jax.evaluate.chart import Chart, line_chart
 from rein3d_jax.evaluate.colour_map import VIRIDIS
 from rein3d_jax.evaluate.plan import Plan, floor_plan
+from rein3d_jax.evaluate.scatter import Scatter, scatter_chart
 from rein3d_jax.evaluate.style import STYLE
 
 SIGNATURES = {b"\xff\xd8\xff": "image/jpeg", b"\x89PNG": "image/png"}
@@ -39,12 +40,14 @@ class Section:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two pictures of one size, one over the other, with a divider to drag."""
+    """Two pictures of one size, one over the other, with a divider to drag; others may stand beside them."""
 
     heading: str
     caption: str
     before: Picture
     after: Picture
+    beside: tuple[Picture, ...] = ()
+    wide: bool = True  # as a Section's
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,7 @@ class Report:
     distance_origin: str = ""  # "given" or "room-shell estimate", with what that means
     warnings: tuple[str, ...] = ()
     parts: tuple[Section | Comparison, ...] = ()
+    standing: Scatter | None = None  # this run among what was measured before
     plan: Plan | None = None
     charts: tuple[Chart, ...] = ()
     tables: tuple[Table, ...] = ()
@@ -80,8 +84,8 @@ def render_report(report: Report) -> str:
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
         f'<meta name="viewport" content="width=device-width,initial-scale=1"><style>{STYLE}</style></head>'
         f"<body><main><h1>{title}</h1><p>{escape(report.summary)}</p>{_facts(report)}{_warnings(report.warnings)}"
-        f"{_each(_part, report.parts)}{_plan(report.plan)}{_charts(report.charts)}"
-        f"{_each(_table, report.tables)}{_sources(report.sources)}</main></body></html>\n"
+        f"{_each(_part, report.parts)}{_standing(report.standing)}{_plan(report.plan)}"
+        f"{_charts(report.charts)}{_each(_table, report.tables)}{_sources(report.sources)}</main></body></html>\n"
     )
 
 
@@ -106,12 +110,12 @@ def _part(part: Section | Comparison) -> str:
 
 
 def _pictures(section: Section) -> str:
-    figures = _each(
-        lambda picture: f"<figure>{_image(picture)}<figcaption>{escape(picture.label)}</figcaption></figure>",
-        section.pictures,
-    )
     scale = _scale(*section.scale) if section.scale else ""
-    return f'<div class="row{" wide" * section.wide}">{figures}</div>{scale}'
+    return f'<div class="row{" wide" * section.wide}">{_each(_figure, section.pictures)}</div>{scale}'
+
+
+def _figure(picture: Picture) -> str:
+    return f"<figure>{_image(picture)}<figcaption>{escape(picture.label)}</figcaption></figure>"
 
 
 def _scale(near: float, far: float) -> str:
@@ -123,11 +127,14 @@ def _scale(near: float, far: float) -> str:
 def _slider(comparison: Comparison) -> str:
     move = "this.parentNode.style.setProperty('--x',this.value+'%')"
     before, after = comparison.before, comparison.after
-    return (
+    slider = (
         f'<div class="slider">{_image(before)}{_image(after, "after")}'
         f'<span class="left">{escape(before.label)}</span><span class="right">{escape(after.label)}</span>'
         f'<input type="range" min="0" max="100" step="0.1" value="50" aria-label="Divider" oninput="{move}"></div>'
     )
+    if comparison.wide and not comparison.beside:
+        return slider
+    return f'<div class="row{" wide" * comparison.wide}">{slider}{_each(_figure, comparison.beside)}</div>'
 
 
 def _image(picture: Picture, kind: str = "") -> str:
@@ -135,7 +142,8 @@ def _image(picture: Picture, kind: str = "") -> str:
     if media is None:
         raise ValueError(f"the picture {picture.label!r} is neither JPEG nor PNG")
     code = base64.b64encode(picture.data).decode("ascii")
-    return f'<img class="{kind}" alt="{escape(picture.label)}" src="data:{media};base64,{code}">'
+    style = f' class="{kind}"' if kind else ""
+    return f'<img{style} alt="{escape(picture.label)}" src="data:{media};base64,{code}">'
 
 
 def _plan(plan: Plan | None) -> str:
@@ -143,6 +151,14 @@ def _plan(plan: Plan | None) -> str:
         return ""
     caption = "Seen from the ceiling. One square of the grid is one metre."
     return f'<section><h2>Where the camera went</h2><p class="quiet">{caption}</p>{floor_plan(plan)}</section>'
+
+
+def _standing(scatter: Scatter | None) -> str:
+    if scatter is None:
+        return ""
+    chart = f'<figure class="standing">{scatter_chart(scatter)}</figure>'
+    caption = f'<p class="quiet">{escape(scatter.caption)}</p>'
+    return f"<section><h2>{escape(scatter.title)}</h2>{caption}{chart}</section>"
 
 
 def _charts(charts: tuple[Chart, ...]) -> str:

@@ -16,10 +16,11 @@ p{margin:.3rem 0 .9rem;max-width:70ch}
 .facts dd{margin:0;font-size:1.15rem;font-weight:600;overflow-wrap:anywhere}
 .warnings{background:#fff6e5;border:1px solid #efd9a7;border-radius:10px;margin:1.2rem 0;padding:.8rem 1rem}
 .warnings ul{margin:.2rem 0 0;padding-left:1.2rem}
-.row{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(46%,240px),1fr));gap:1rem;align-items:start}
+.row{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(46%,240px),360px));gap:1rem;align-items:start}
 .wide{grid-template-columns:repeat(auto-fit,minmax(min(100%,440px),1fr))}
 figure{margin:0}
 figure img,svg{display:block;width:100%;height:auto;border-radius:8px}
+.standing{max-width:560px}
 figcaption{font-size:.9rem;margin-top:.3rem}
 .scale{display:flex;gap:.7rem;align-items:center;max-width:30rem;margin:.7rem 0;font-size:.9rem}
 .scale i{flex:1;height:12px;border-radius:6px}

@@ -22,11 +22,12 @@ POLICY = (
     "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; worker-src data: blob:; "
     "connect-src data: blob:; script-src 'unsafe-inline' 'wasm-unsafe-eval' data: blob:"
 )
+SERVED_POLICY = POLICY.replace("connect-src", "connect-src 'self'")
 FILTER_VARIANCE = 0.3  # pixels^2, RasterizeConfig's; pass the scene's own where it was made with another
 
 
 def render_viewer(
-    scenes: Mapping[str, bytes],
+    scenes: Mapping[str, bytes | str],
     panorama: bytes | None,
     plan: Plan,
     *,
@@ -34,13 +35,18 @@ def render_viewer(
     backdrop: Sequence[float] = (0.5, 0.5, 0.5),
     filter_variance: float = FILTER_VARIANCE,
 ) -> str:
-    """The whole page. `scenes`: name -> the bytes of an SPZ file (io/spz.py), the last one shown first. `panorama`: a
-    JPEG or PNG file. `plan`: the walls and paths of the map, and the area that one may walk in. `backdrop`: the sRGB
-    colour of what no splat covers. Raises ValueError for a scene or picture of another format."""
-    if not scenes or any(not data.startswith(b"\x1f\x8b") for data in scenes.values()):
-        raise ValueError("a viewer's scenes are one SPZ file or more")
+    """The whole page. `scenes`: name -> the bytes of an SPZ file (io/spz.py), the last one shown first; or all of them
+    paths on the server that the page comes from, fetched when they are looked at. `panorama`: a JPEG or PNG file.
+    `plan`: the walls and paths of the map, and the area that one may walk in. `backdrop`: the sRGB colour of what no
+    splat covers. Raises ValueError for a scene or picture of another format."""
+    served = all(isinstance(data, str) for data in scenes.values())
+    if not scenes or not (served or all(_is_spz(data) for data in scenes.values())):
+        raise ValueError("a viewer's scenes are one SPZ file or more, or all of them paths on its server")
     payload = {
-        "scenes": [{"name": name, "spz": _base64(data)} for name, data in scenes.items()],
+        "scenes": [
+            {"name": name, "url": data} if served else {"name": name, "spz": _base64(data)}
+            for name, data in scenes.items()
+        ],
         "panorama": _picture(panorama) if panorama is not None else None,
         "walls": _points(plan.walls),
         "safe": _points(plan.safe),
@@ -50,7 +56,7 @@ def render_viewer(
     }
     parts = {
         "title": escape(title),
-        "policy": POLICY,
+        "policy": SERVED_POLICY if served else POLICY,
         "style": _file("page.css"),
         "licences": escape(_file("LICENCES.txt")),
         "data": json.dumps(payload, allow_nan=False).replace("<", "\\u003c"),  # no name can end the script
@@ -62,6 +68,10 @@ def render_viewer(
 
 def _file(name: str) -> str:
     return files(__package__).joinpath("viewer_page", name).read_text("utf-8")
+
+
+def _is_spz(data: bytes | str) -> bool:
+    return isinstance(data, bytes) and data.startswith(b"\x1f\x8b")
 
 
 def _base64(data: bytes) -> str:

@@ -12,6 +12,7 @@ from rein3d_jax.io.input_file import require_file
 
 MAX_COLUMNS = 16384
 _FORMATS = ("jpeg", "png", "openexr", "hdr")  # OpenImageIO reads many more, a made-up ".null" among them
+_CREDIT = 200  # characters of each
 _MEND = f"give a JPEG, PNG, EXR or HDR file of at most {MAX_COLUMNS} columns"
 
 
@@ -49,6 +50,14 @@ def read_pixels(path: Path, image: oiio.ImageInput, kind: str) -> np.ndarray:
     if pixels is None or error:
         raise InputError(f"{path} is damaged or cut short ({_first_line(error)}): copy or export it again")
     return pixels
+
+
+def read_credit(path: Path) -> str:
+    """Who made the picture, and what they allow, as its header has it in one line; "" where it says nothing. Raises
+    InputError as `open_image` does."""
+    with open_image(path) as image:
+        said = (image.spec().get_string_attribute(name) for name in ("Artist", "Copyright"))
+        return "; ".join(" ".join(text.split())[:_CREDIT] for text in said if text.strip())
 
 
 def _check_whole_and_upright(path: Path, spec: oiio.ImageSpec) -> None:

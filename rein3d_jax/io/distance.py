@@ -7,8 +7,8 @@ import numpy as np
 import OpenImageIO as oiio
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.atomic import atomic_path
 from rein3d_jax.io.decode import open_image, read_pixels
+from rein3d_jax.io.exr import write_exr
 from rein3d_jax.io.npy import read_arrays, read_headers
 
 _METRES_PER_UNIT = 0.001  # 16-bit PNG holds millimetres
@@ -37,23 +37,7 @@ def read_distance(path: str | Path, shape: tuple[int, int]) -> tuple[np.ndarray,
 def write_distance_exr(path: str | Path, distance: np.ndarray) -> None:
     """Distance (h, w) metres, 0 where unknown, to a float32 EXR file with the channel Y, atomically.
     The same distance gives the same bytes. Raises InputError."""
-    distance = np.asarray(distance, np.float32)
-    spec = oiio.ImageSpec(distance.shape[1], distance.shape[0], 1, "float")
-    spec.channelnames = ("Y",)
-    spec.attribute("compression", "zip")
-    spec.attribute("DateTime", "1980:01:01 00:00:00")  # or the time of writing goes in
-    with atomic_path(path) as temporary:
-        out = oiio.ImageOutput.create("openexr")
-        written = out.open(str(temporary), spec) and out.write_image(distance[..., None]) and out.close()
-        if not (written and _holds(temporary, distance)):
-            raise OSError(out.geterror() or "incomplete, is the disk full?")
-
-
-def _holds(path: Path, distance: np.ndarray) -> bool:
-    # OpenImageIO does not notice when the last bytes of a file find no room (measured with RLIMIT_FSIZE).
-    image = oiio.ImageInput.open(str(path))
-    pixels = None if image is None else image.read_image("float")
-    return pixels is not None and np.array_equal(pixels[..., 0], distance, equal_nan=True)
+    write_exr(path, {"Y": distance})
 
 
 def _check_metres(path: Path, known: np.ndarray) -> None:

@@ -48,3 +48,8 @@ def filmic(x: np.ndarray) -> np.ndarray:
 def srgb_from_linear(linear: np.ndarray) -> np.ndarray:
     """The sRGB transfer (IEC 61966-2-1) of values in [0, 1]."""
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.power(linear, 1 / 2.4) - 0.055)
+
+
+def linear_from_srgb(srgb: np.ndarray) -> np.ndarray:
+    """The inverse of `srgb_from_linear`."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, np.power((srgb + 0.055) / 1.055, 2.4))

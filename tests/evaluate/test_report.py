@@ -6,6 +6,7 @@ import re
 import xml.etree.ElementTree as ElementTree
 from html.parser import HTMLParser
 
+import html5lib
 import numpy as np
 import pytest
 from hypothesis import given
@@ -15,6 +16,7 @@ from rein3d_jax.evaluate.chart import MAX_POINTS, Chart, Series, line_chart, nic
 from rein3d_jax.evaluate.colour_map import UNKNOWN, VIRIDIS, colour_map, colour_range
 from rein3d_jax.evaluate.plan import Plan, floor_plan, outline
 from rein3d_jax.evaluate.report import Comparison, Picture, Report, Section, Table, render_report
+from rein3d_jax.evaluate.scatter import Mark, Scatter, cost_ticks, scatter_chart
 
 JPEG, PNG = b"\xff\xd8\xff\xe0 a jpeg", b"\x89PNG\r\n\x1a\n a png"
 HOSTILE = "<script>alert(1)</script> \"quoted\" & 'single'"
@@ -27,6 +29,16 @@ WHOLE = Report(
     parts=(
         Section(f"section {HOSTILE}", f"caption {HOSTILE}", (Picture(f"picture {HOSTILE}", JPEG),), scale=(0.5, 4.0)),
         Comparison("comparison", "", Picture("coarse", JPEG), Picture("refined", PNG)),
+        Comparison(
+            "small", "", Picture("a", JPEG), Picture("b", PNG), (Picture(f"beside {HOSTILE}", PNG),), wide=False
+        ),
+    ),
+    standing=Scatter(
+        f"standing {HOSTILE}",
+        f"stands {HOSTILE}",
+        f"cost {HOSTILE}",
+        "dB",
+        (Mark(f"mark {HOSTILE}", 3.0, 20.0), Mark("this run", 90.0, 22.0, own=True)),
     ),
     plan=Plan(outline(np.ones(16)), outline(np.full(16, 0.6)), (np.array([[0, 0], [0.5, 0]]),), np.zeros((0, 2))),
     charts=(
@@ -71,8 +83,35 @@ def test_the_page_is_well_formed_and_shows_every_text_as_text(page):
     assert not any(tag == "script" for tag, _ in page.tags)
     text = "".join(page.words)
     above = ("title", "summary", "fact", "value", "origin", "warning", "section", "caption", "picture")
-    for name in (*above, "chart", "x", "series", "table", "column", "cell", "source"):
+    for name in (
+        *above,
+        "beside",
+        "standing",
+        "stands",
+        "cost",
+        "mark",
+        "chart",
+        "x",
+        "series",
+        "table",
+        "column",
+        "cell",
+        "source",
+    ):
         assert f"{name} {HOSTILE}" in text
+
+
+@pytest.mark.parametrize("report", [WHOLE, Report("a room", "nothing yet")])
+def test_a_parser_of_the_html_standard_finds_no_error(report):
+    parser = html5lib.HTMLParser(strict=True)  # raises at the first
+    parser.parse(render_report(report))
+    assert not parser.errors
+
+
+def test_pictures_drawings_and_dividers_have_words(page):
+    assert all(attrs.get("alt") for tag, attrs in page.tags if tag == "img")
+    assert all(attrs.get("aria-label") for tag, attrs in page.tags if tag in ("input", "svg"))
+    assert sum(tag == "input" for tag, _ in page.tags) == 2  # one divider a comparison
 
 
 def test_the_page_asks_nothing_of_the_network(page):
@@ -84,8 +123,8 @@ def test_the_page_asks_nothing_of_the_network(page):
 
 def test_pictures_arrive_whole(page):
     pictures = [attrs["src"].split(";base64,") for tag, attrs in page.tags if tag == "img"]
-    assert [head for head, _ in pictures] == ["data:image/jpeg", "data:image/jpeg", "data:image/png"]
-    assert [base64.b64decode(code) for _, code in pictures] == [JPEG, JPEG, PNG]
+    assert [base64.b64decode(code) for _, code in pictures] == [JPEG, JPEG, PNG, JPEG, PNG, PNG]
+    assert all((head == "data:image/png") == (base64.b64decode(code) == PNG) for head, code in pictures)
 
 
 def test_what_is_no_picture_is_refused():
@@ -125,6 +164,31 @@ def test_an_outline_follows_the_columns_to_the_right():
     np.testing.assert_allclose(np.linalg.norm(points, axis=1), [1, 2, 3, 4], rtol=1e-6)  # float32
     assert points[1][0] > 0 and points[1][1] > 0  # ahead, to the left
     assert points[2][0] > 0 and points[2][1] < 0  # ahead, to the right
+
+
+def test_marks_stand_by_their_cost_and_merit():
+    marks = (Mark("slow", 100.0, 20.0), Mark("quick", 1.0, 20.0), Mark("best", 10.0, 25.0, own=True))
+    slow, quick, best = circles(scatter_chart(Scatter("t", "c", "seconds", "dB", marks)))
+    assert quick[0] < best[0] < slow[0] and best[1] < quick[1] == slow[1]
+    np.testing.assert_allclose(best[0] - quick[0], slow[0] - best[0], atol=0.2)  # a log scale
+
+
+def test_a_run_without_truth_is_a_line_at_its_seconds():
+    svg = scatter_chart(Scatter("t", "c", "s", "dB", (Mark("a", 5.0, 20.0), Mark("this run", 50.0, None, own=True))))
+    assert svg.count("<circle") == 1 and "stroke-dasharray" in svg and "this run: 50<" in svg
+
+
+@pytest.mark.parametrize("marks", [[], [(np.nan, 3.0)], [(0.0, 3.0)], [(1.0, np.inf)], [(7.0, None)], [(3.0, 3.0)]])
+def test_any_marks_give_a_chart(marks):
+    svg = scatter_chart(Scatter("t", "c", "s", "dB", tuple(Mark("a", *mark) for mark in marks)))
+    assert "nan" not in svg and "inf" not in svg and ("Nothing was measured" in svg) == (marks != [(3.0, 3.0)])
+
+
+@given(st.lists(st.floats(1e-3, 1e6), min_size=1, max_size=5))
+def test_cost_ticks_hold_all_costs(costs):
+    ticks = cost_ticks(costs)
+    assert len(ticks) >= 2 and ticks[0] <= min(costs) and max(costs) <= ticks[-1]
+    assert (np.diff(ticks) > 0).all() and len(ticks) <= 12
 
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6))

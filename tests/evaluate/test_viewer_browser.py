@@ -17,7 +17,7 @@ from rein3d_jax.io.spz import encode_spz
 from rein3d_jax.rasterize import RasterizeConfig, render
 from rein3d_jax.scene import Gaussians
 
-playwright = pytest.importorskip("playwright.sync_api", reason="pip install playwright to run the viewer's tests")
+playwright = pytest.importorskip("playwright.sync_api", reason="pip install 'rein3d-jax[browser]'")
 
 SIZE, FOV = 256, 70  # pixels, degrees
 ROWS = 96

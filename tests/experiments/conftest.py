@@ -1,6 +1,7 @@
 """A small room with ground truth in the layout of ../shared/rooms: a box to walk in and one that hides a part of it."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -68,8 +69,58 @@ def rooms(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def room():
+    """What `rooms` are: half sizes of the walls (3,), opposite corners of the chest (2, 3)."""
+    return SimpleNamespace(walls=WALLS, chest=CHEST)
+
+
+@pytest.fixture(scope="session")
+def room_seen():
+    """(eye (3,), unit rays (..., 3)) -> colour (..., 3) and distance (...) of the room."""
+    return seen
+
+
+@pytest.fixture(scope="session")
 def turned_pose():
     """world_from_camera (4, 4) of an unturned panorama at the origin."""
     pose = np.eye(4)
     pose[:3, :3] = UNTURNED
     return pose
+
+
+@pytest.fixture(scope="session")
+def run_folder(rooms, tmp_path_factory):
+    """A run's folder, written from the room's truth: its restored videos are exact, its scene is the lifted input."""
+    from experiments.config import config_from, dump_config
+    from experiments.inputs import read_panorama
+    from experiments.pipeline import Restored, lift_scene
+    from experiments.reconstruct import ReconstructConfig
+    from rein3d_jax.explore.trajectories import radial_trajectories
+    from rein3d_jax.geometry.sphere import rays_of_pose as rays_at
+    from rein3d_jax.io.checkpoint import save
+    from rein3d_jax.io.ply import write_ply
+    from rein3d_jax.scene import Video
+
+    folder, room = tmp_path_factory.mktemp("run") / "room", rooms / "room2"
+    files = {"panorama": str(room / "input.png"), "distance": str(room / "input_distance.exr"), "views": "none"}
+    table = {"output": str(folder), "input": {**files, "height": 64}, "explore": {"trajectories": 2, "step": 0.4}}
+    config = config_from(ReconstructConfig, table)
+
+    def stage(name, result):
+        key = np.zeros(32, np.uint8)
+        save(folder / "stages" / f"{name}.npz", {"key": key, "result": result, "seconds": np.float64(1)})
+
+    panorama, _ = read_panorama(config.input, config.depth, config.shell)
+    coarse, paths = lift_scene(panorama, config.lift), radial_trajectories(panorama, config=config.explore)
+    stage("read", (panorama, np.array([False])))
+    stage("lift", coarse)
+    stage("explore", paths)
+    for index, count in enumerate(np.asarray(paths.counts)):
+        poses = np.asarray(paths.world_from_camera[index, :count])
+        truth = [seen(pose[:3, 3], np.asarray(rays_at(pose, 64, 128))) for pose in poses]
+        rgb, distance = (np.float32(part) for part in zip(*truth, strict=True))
+        video = Video(rgb, np.ones_like(distance), distance, poses)
+        stage(f"restore-{index:02d}", Restored(coarse, video, np.zeros((), np.int32), np.zeros(4, np.int32)))
+    write_ply(folder / "scene.ply", coarse)
+    (folder / "config.toml").write_text(dump_config(config))
+    return folder

@@ -68,11 +68,18 @@ function addSpark() {
 }
 
 // Each view: what to call it, and its object in the scene, made when it is first looked at.
-const views = data.scenes.map(({ name, spz }) => ({ name, make: () => splats(spz) }));
+const views = data.scenes.map(({ name, spz, url }) => ({ name, make: () => splats(spz, url) }));
 if (data.panorama) views.unshift({ name: "Input panorama", still: true, make: sphere });
 
-async function splats(spz) {
-  const mesh = new libraries.SplatMesh({ fileBytes: bytes(spz), fileType: libraries.SplatFileType.SPZ, extSplats: true });
+async function fetched(url) {
+  const answer = await fetch(url);
+  if (!answer.ok) throw new Error(`the server answered ${answer.status}`);
+  return new Uint8Array(await answer.arrayBuffer());
+}
+
+async function splats(spz, url) {
+  const fileBytes = url ? await fetched(url) : bytes(spz);
+  const mesh = new libraries.SplatMesh({ fileBytes, fileType: libraries.SplatFileType.SPZ, extSplats: true });
   mesh.quaternion.set(1, 0, 0, 0); // an SPZ file holds y and z flipped: half a turn about x
   await mesh.initialized;
   return mesh;
