@@ -79,7 +79,7 @@ def _panoramas(run: RunFolder, output: Path, options) -> str:
 
 def _scene(run: RunFolder, output: Path, suffix: str) -> str:
     path = output / f"scene.{suffix}"
-    write_gaussians(path, run.refined)
+    write_gaussians(path, run.refined, antialias=run.config.rasterize.antialias)
     return f"{path}: {path.stat().st_size / 1e6:.1f} MB"
 
 

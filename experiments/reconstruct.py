@@ -196,7 +196,7 @@ def _write(config, output, views, store, progress, started, panorama, origin, co
            curves, overflow) -> dict:  # fmt: skip
     """scene.ply, flythrough.mp4, viewer.html, report.html, metrics.json, in the order in which one would miss them."""
     begun = time.perf_counter()
-    write_ply(output / "scene.ply", refined)
+    write_ply(output / "scene.ply", refined, antialias=config.rasterize.antialias)
     backdrop = jnp.mean(panorama.rgb, axis=(0, 1))
     film = flythrough(refined, trajectories, backdrop, film=config.film, config=config.rasterize)
     write_mp4(output / "flythrough.mp4", film, config.film.rate)

@@ -30,9 +30,11 @@ def read_gaussians(path: str | Path) -> Gaussians:
     return _format(path)[0](path)
 
 
-def write_gaussians(path: str | Path, gaussians: Gaussians) -> None:
-    """Writes the alive slots to `path`, atomically; what a format cannot hold is in its module. Raises InputError."""
-    _format(path)[1](path, gaussians)
+def write_gaussians(path: str | Path, gaussians: Gaussians, *, antialias: bool = False) -> None:
+    """Writes the alive slots to `path`, atomically; what a format cannot hold is in its module. `antialias` is
+    write_ply's; .compressed.ply and .splat have no place for it. Raises InputError."""
+    write = _format(path)[1]
+    write(path, gaussians, **({"antialias": antialias} if write in (write_ply, write_spz) else {}))
 
 
 def _format(path: str | Path) -> tuple[Callable[..., Gaussians], Callable[..., None]]:

@@ -14,19 +14,22 @@ from rein3d_jax.io.input_file import require_file
 from rein3d_jax.scene import Gaussians
 
 _NORMALS = ["nx", "ny", "nz"]  # always 0: viewers expect the columns, nobody reads them
+ANTIALIASED = "comment antialiased (Mip-Splatting, eq. 9)"
 _HEADER_LIMIT = 65536  # bytes; a degree-3 header takes 1500
 _REST_COUNTS = (0, 9, 24, 45)  # 3 ((degree + 1)^2 - 1)
 _TYPES = dict(char="i1", uchar="u1", short="i2", ushort="u2", int="i4", uint="u4", float="f4", double="f8")
 _TYPES |= dict(int8="i1", uint8="u1", int16="i2", uint16="u2", int32="i4", uint32="u4", float32="f4", float64="f8")
 
 
-def write_ply(path: str | Path, gaussians: Gaussians) -> None:
-    """Writes the alive slots, atomically. Raises InputError, and writes nothing, if any value is not finite."""
+def write_ply(path: str | Path, gaussians: Gaussians, *, antialias: bool = False) -> None:
+    """Writes the alive slots, atomically. `antialias` says in the header that the scene was made for a rasterizer that
+    scales opacity by what its filter spreads out; the layout has no field for it, and one that does not shows small
+    splats too dense. Raises InputError, and writes nothing, if any value is not finite."""
     table = _table(gaussians)
     _check_finite(path, table)
     names = _property_names(table.shape[1] - 17)
     names[3:3] = _NORMALS
-    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(table)}"]
+    lines = ["ply", "format binary_little_endian 1.0", *[ANTIALIASED] * antialias, f"element vertex {len(table)}"]
     lines += [f"property float {name}" for name in names] + ["end_header", ""]
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
         file.write("\n".join(lines).encode())

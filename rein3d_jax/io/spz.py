@@ -33,8 +33,8 @@ _FLIP = np.array([1, -1, -1], np.float32)  # y and z
 _FLIP_REST = np.array([-1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1], np.float32)[:, None]
 
 
-def encode_spz(gaussians: Gaussians, name: str | Path = "the scene") -> bytes:
-    """The alive slots as the bytes of an SPZ file. Raises InputError, calling the scene `name`, if a value is not
+def encode_spz(gaussians: Gaussians, name: str | Path = "the scene", *, antialias: bool = False) -> bytes:
+    """The alive slots as the bytes of an SPZ file; `antialias` sets the flag that write_ply explains. Raises InputError, calling the scene `name`, if a value is not
     finite, if there are over MAX_GAUSSIANS, or if it reaches beyond 8000 km."""
     c = alive_columns(gaussians, name)
     count, bits = len(c.means), _fractional_bits(c.means, name)
@@ -49,13 +49,13 @@ def encode_spz(gaussians: Gaussians, name: str | Path = "the scene") -> bytes:
         _byte(127.5 + 127.5 * _turned(c.quats)[:, 1:] * _FLIP),
         _rest_bytes(c.sh[:, 1:] * _FLIP_REST[: c.sh.shape[1] - 1]),
     ]
-    header = _HEADER.pack(b"NGSP", 2, count, REST_COUNTS.index(c.sh.shape[1] - 1), bits, 0, 0)
+    header = _HEADER.pack(b"NGSP", 2, count, REST_COUNTS.index(c.sh.shape[1] - 1), bits, antialias, 0)
     return gzip.compress(header + b"".join(part.tobytes() for part in parts), mtime=0)
 
 
-def write_spz(path: str | Path, gaussians: Gaussians) -> None:
+def write_spz(path: str | Path, gaussians: Gaussians, *, antialias: bool = False) -> None:
     """Writes the alive slots, atomically. Raises InputError as encode_spz does, and writes nothing."""
-    write_bytes(path, encode_spz(gaussians, path))
+    write_bytes(path, encode_spz(gaussians, path, antialias=antialias))
 
 
 def read_spz(path: str | Path) -> Gaussians:

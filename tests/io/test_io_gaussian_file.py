@@ -14,6 +14,7 @@ import struct
 import subprocess
 from pathlib import Path
 
+import jax
 import numpy as np
 import plyfile
 import pytest
@@ -97,6 +98,22 @@ def test_round_trip_within_the_steps_of_the_format(tmp_path, suffix, degree):
     got = read_gaussians(path)
     assert got.alive.all() and got.means.shape == (N - 2, 3) and got.sh.shape == (N - 2, (degree + 1) ** 2, 3)
     close(got, wanted, BOUNDS[suffix])
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_the_antialias_flag_changes_nothing_else(tmp_path, suffix):
+    plain, flagged = tmp_path / f"a.{suffix}", tmp_path / f"b.{suffix}"
+    write_gaussians(plain, scene(1))
+    write_gaussians(flagged, scene(1), antialias=True)
+    for a, b in zip(*(jax.tree.leaves(read_gaussians(path)) for path in (plain, flagged)), strict=True):
+        np.testing.assert_array_equal(a, b)
+    if suffix == "ply":
+        assert plyfile.PlyData.read(flagged).comments == ["antialiased (Mip-Splatting, eq. 9)"]
+    elif suffix == "spz":
+        flags = [gzip.decompress(path.read_bytes())[14] for path in (plain, flagged)]
+        assert flags == [0, 1]  # the reference's FlagAntialiased
+    else:
+        assert plain.read_bytes() == flagged.read_bytes()
 
 
 def close(got, wanted, bounds):
