@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
+from experiments.refine_devices import steps_over
 from rein3d_jax.depth.complete import CompleteConfig
 from rein3d_jax.depth.shell_from_distance import shell_from_distance
 from rein3d_jax.explore.hidden import hidden_distance
@@ -15,6 +16,7 @@ from rein3d_jax.explore.trajectories import Trajectories
 from rein3d_jax.geometry.poses import equirectangular_camera, rigid
 from rein3d_jax.geometry.sphere import rays_of_pose, world_from_camera_axes
 from rein3d_jax.lift import LiftConfig, compact, lift, merge, with_capacity
+from rein3d_jax.parallel import data_mesh
 from rein3d_jax.rasterize import RasterizeConfig, allocate, enlarge, render
 from rein3d_jax.refine import RefineConfig, Views, join_views, refine, views_from_panorama
 from rein3d_jax.refine.prune import contribution, prune_to, prune_within
@@ -182,4 +184,6 @@ def refine_scene(
 ) -> tuple[Gaussians, dict]:
     """The refined scene and its curves (paper Sec. 3.3); `options` are `refine`'s."""
     scene = _needed(scene, views, stages)
+    if stages.refine.devices != 1:
+        options["run"] = steps_over(data_mesh(stages.refine.devices))
     return refine(scene, views, extent, key, config=stages.refine, raster=stages.rasterize, **options)

@@ -34,8 +34,9 @@ _FLIP_REST = np.array([-1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1], np.
 
 
 def encode_spz(gaussians: Gaussians, name: str | Path = "the scene", *, antialias: bool = False) -> bytes:
-    """The alive slots as the bytes of an SPZ file; `antialias` sets the flag that write_ply explains. Raises InputError, calling the scene `name`, if a value is not
-    finite, if there are over MAX_GAUSSIANS, or if it reaches beyond 8000 km."""
+    """The alive slots as the bytes of an SPZ file; `antialias` sets the flag that write_ply explains. Raises
+    InputError, calling the scene `name`, if a value is not finite, if there are over MAX_GAUSSIANS, or if it reaches
+    beyond 8000 km."""
     c = alive_columns(gaussians, name)
     count, bits = len(c.means), _fractional_bits(c.means, name)
     if count > MAX_GAUSSIANS:

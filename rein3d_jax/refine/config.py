@@ -11,6 +11,7 @@ DENSIFICATIONS = ("default", "mcmc")
 class RefineConfig:
     steps: int = 15_000
     batch: int = 4  # views a step
+    devices: int = 1  # that share a step's views; 0 takes all
     panoramic: bool = False  # fit to whole panoramas weighed by solid angle, not to perspective views of them
     crop: int = 512  # pixels a side of a perspective view, or rows of a panorama
     fov: float = 90.0  # degrees; six of 90 tile the sphere
