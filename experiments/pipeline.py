@@ -15,7 +15,7 @@ from rein3d_jax.explore.profile import ExploreConfig
 from rein3d_jax.explore.trajectories import Trajectories
 from rein3d_jax.geometry.poses import equirectangular_camera, rigid
 from rein3d_jax.geometry.sphere import rays_of_pose, world_from_camera_axes
-from rein3d_jax.lift import LiftConfig, compact, lift, merge, with_capacity
+from rein3d_jax.lift import LiftConfig, compact, lift, lift_adaptively, merge, with_capacity
 from rein3d_jax.parallel import data_mesh
 from rein3d_jax.rasterize import RasterizeConfig, allocate, enlarge, render
 from rein3d_jax.refine import RefineConfig, Views, join_views, refine, views_from_panorama
@@ -48,7 +48,8 @@ def lift_scene(panorama: Panorama, config: LiftConfig) -> Gaussians:
     """The coarse scene, in a buffer with room for what exploring will add."""
     everywhere = jnp.ones(panorama.distance.shape, bool)
     placed = panorama.replace(valid=everywhere)  # an unknown distance was completed; its colour is known
-    return with_capacity(lift(placed, origin_pose(), everywhere, config=config), config.capacity)
+    scene = lift_adaptively(placed, origin_pose(), everywhere, config=config)
+    return with_capacity(scene, config.capacity or scene.alive.size + everywhere.size // config.stride**2)
 
 
 def render_video(gaussians: Gaussians, poses: jax.Array, height: int, raster: RasterizeConfig):

@@ -1,6 +1,7 @@
 """Panorama + distance -> Gaussians."""
 
+from rein3d_jax.lift.adaptive import lift_adaptively
 from rein3d_jax.lift.buffer import compact, merge, with_capacity
 from rein3d_jax.lift.lift import LiftConfig, lift
 
-__all__ = ["LiftConfig", "compact", "lift", "merge", "with_capacity"]
+__all__ = ["LiftConfig", "compact", "lift", "lift_adaptively", "merge", "with_capacity"]

@@ -27,9 +27,14 @@ class LiftConfig:
     capacity: int = 0  # slots of the scene's buffer; 0 gives twice the lifted pixels, room for what exploring adds
     stride: int = 1  # lift every stride-th pixel of every stride-th row
     opacity: float = 0.99
-    footprint: float = 0.85  # sigma over half the diagonal of a pixel's footprint; see _sigma
+    footprint: float = 0.85  # sigma over half the diagonal of a pixel's footprint; see footprint_sigma
     steepest: float = 6.0  # tangent of incidence up to which a splat is stretched along its surface; 0: never
     thickness: float = 0.3  # of a splat across its surface, over its width
+    # At most share x pixels become Gaussians, the fewer the smoother the picture and the flatter the surface; 1: all.
+    share: float = 1.0
+    largest: int = 16  # with a share below 1: most pixels along a side that one Gaussian stands for, a power of 2
+    flatness: float = 0.003  # there, relative: how far a surface may stray from the plane of its Gaussian
+    leaf_step: float = 0.05  # there, relative: steps of inverse distance that no Gaussian spans
     snap_edges: bool = True
     # See edges.snap_edges. At 256 x 512, 24 links hold a step blurred by a Gaussian of 3 pixels (4 % of the pixels
     # off both surfaces before, none after; with 16 links still 4 %). The price on exact, furnished rooms of that
@@ -39,7 +44,7 @@ class LiftConfig:
     edge_slope: float = 0.01
 
 
-def _sigma(distance: jax.Array, row_pitch: float, latitude: jax.Array, footprint: float) -> jax.Array:
+def footprint_sigma(distance: jax.Array, row_pitch: float, latitude: jax.Array, footprint: float) -> jax.Array:
     """sigma = footprint * half the diagonal of a footprint `distance * pitch` high and cos(latitude) times as wide.
 
     Half the diagonal is how far the splat must reach (its pixel's corner), so it follows the shrinking of a row but
@@ -91,7 +96,7 @@ def _lift(
     axes, tangent = (x[chosen].reshape(-1, *x.shape[2:]) for x in surface_axes(slope, height, width))
     rays = rays_of_pose(world_from_camera, height, width)[chosen].reshape(-1, 3)
     latitude = jnp.repeat(latitudes(height)[chosen[0]], width // stride)
-    sigma = _sigma(distance, stride * jnp.pi / height, latitude, config.footprint)
+    sigma = footprint_sigma(distance, stride * jnp.pi / height, latitude, config.footprint)
     along, across = jnp.sqrt(1 + tangent**2), jnp.ones_like(tangent)
     stretch = jnp.stack([along, across, config.thickness * across], axis=-1)
     turn = jnp.matmul(world_from_camera[:3, :3], world_from_camera_axes().T, precision=jax.lax.Precision.HIGHEST)

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 
 from rein3d_jax.geometry.resample import pad_sphere
 from rein3d_jax.geometry.safe import safe_norm
-from rein3d_jax.geometry.sphere import azimuths, horizontal_direction, latitudes, pixel_rays
+from rein3d_jax.geometry.sphere import latitudes, pixel_rays
 
 
 def slopes(distance: jax.Array, known: jax.Array) -> jax.Array:
@@ -42,13 +42,19 @@ def surface_axes(slope: jax.Array, height: int, width: int) -> tuple[jax.Array, 
     The first axis runs along the surface where it falls away most, the second across it, the third is its normal. Seen
     from the panorama's centre, a disc stretched along the first by sqrt(1 + tangent^2) looks round.
     """
+    axes, steep, _ = axes_at(pixel_rays(height, width), slope)
+    return axes, steep
+
+
+def axes_at(ray: jax.Array, slope: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """(`surface_axes` of rays (..., 3) with slopes (..., 2); tangents of incidence; the unit vector (..., 2), towards
+    growing columns and upward, of the way in which the surface falls away)."""
     steep = safe_norm(slope)
     some = steep > 1e-6
     way = jnp.where(some[..., None], slope / jnp.where(some, steep, 1.0)[..., None], jnp.array([1.0, 0.0]))
-    ray, azimuth, latitude = pixel_rays(height, width), azimuths(width), latitudes(height)[:, None, None]
-    right = jnp.broadcast_to(horizontal_direction(azimuth + jnp.pi / 2), ray.shape)
-    up = jnp.cos(latitude) * jnp.array([0.0, 0.0, 1.0]) - jnp.sin(latitude) * horizontal_direction(azimuth)
-    along = way[..., :1] * right + way[..., 1:] * up
+    right = jnp.stack([ray[..., 1], -ray[..., 0], jnp.zeros_like(steep)], axis=-1)
+    right /= safe_norm(right, keepdims=True)  # no pixel's ray is a pole
+    along = way[..., :1] * right + way[..., 1:] * jnp.cross(right, ray)
     first = (along + steep[..., None] * ray) / jnp.sqrt(1 + steep**2)[..., None]
     second = jnp.cross(ray, along)
-    return jnp.stack([first, second, jnp.cross(first, second)], axis=-1), steep
+    return jnp.stack([first, second, jnp.cross(first, second)], axis=-1), steep, way
