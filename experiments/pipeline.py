@@ -10,6 +10,7 @@ from flax import struct
 from experiments.refine_devices import steps_over
 from rein3d_jax.depth.complete import CompleteConfig
 from rein3d_jax.depth.shell_from_distance import shell_from_distance
+from rein3d_jax.evaluate.coverage import coverage
 from rein3d_jax.explore.hidden import hidden_distance
 from rein3d_jax.explore.profile import ExploreConfig
 from rein3d_jax.explore.trajectories import Trajectories
@@ -92,7 +93,9 @@ class Restored:
     """The job's state after a trajectory: enough to go on with the next one, to the bit."""
 
     scene: Gaussians
-    video: Video  # the trajectory's frames, holes filled; alpha still says what was observed
+    video: Video  # the trajectory's frames, holes filled; alpha still says what was observed. The first one alone
+    # where the path revealed too little to be restored
+    revealed: jax.Array  # () share of the sphere that was open at the path's end
     overflow: jax.Array  # () Gaussians that found no slot in the scene's buffer, so far
     buffers: jax.Array  # (4,) the rasterizer's capacities: sums over other buffer sizes round otherwise
 
@@ -118,13 +121,17 @@ def restore_trajectory(
         raster = enlarge(stages.rasterize, *(int(x) for x in last.buffers))
     poses = trajectories.world_from_camera[index, : int(trajectories.counts[index])]
     seen = scene if stages.restore.sequential else coarse
+    end, raster = render_video(seen, poses[-1:], stages.restore.height, raster)
+    revealed = 1 - jnp.mean(coverage(end.alpha))
+    if revealed < stages.explore.least:
+        start, raster = render_video(seen, poses[:1], stages.restore.height, raster)
+        return Restored(scene, start, revealed, jnp.asarray(overflow), jnp.array(raster.buffers))
     degraded, raster = render_video(seen, poses, stages.restore.height, raster)
     restored = restorer(stages.restore, background, network)(degraded, jax.random.fold_in(key, index))
     if stages.restore.method != "none":
         scene, dropped, raster = _fuse(scene, degraded, restored, panorama, stages, raster)
         overflow += dropped
-    buffers = jnp.array(raster.buffers)
-    return Restored(scene, restored, jnp.asarray(overflow), buffers)
+    return Restored(scene, restored, revealed, jnp.asarray(overflow), jnp.array(raster.buffers))
 
 
 def _first_buffers(coarse: Gaussians, trajectories: Trajectories, stages: Stages) -> RasterizeConfig:

@@ -11,7 +11,6 @@ import argparse
 import dataclasses
 import importlib.metadata
 import json
-import resource
 import sys
 import time
 from functools import partial
@@ -21,7 +20,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from experiments import inputs, story
+from experiments import inputs, run_metrics, story
+from experiments.budget import BudgetConfig, Clock, within
 from experiments.compile_cache import use_compile_cache
 from experiments.config import dump_config, load_config, recipe_digest
 from experiments.flythrough import FilmConfig, flythrough
@@ -50,7 +50,7 @@ from rein3d_jax.explore.trajectories import Trajectories, radial_trajectories
 from rein3d_jax.io.atomic import write_text
 from rein3d_jax.io.ply import write_ply
 from rein3d_jax.io.video import write_mp4
-from rein3d_jax.refine import STOPPED, blank_snapshot
+from rein3d_jax.refine import blank_snapshot
 from rein3d_jax.scene import Gaussians, Panorama, Video
 
 PACKAGES = ("rein3d-jax", "jax", "jaxlib", "flax", "optax", "numpy", "opencv-contrib-python-headless", "OpenImageIO")
@@ -65,6 +65,7 @@ class ReconstructConfig(Stages):
     input: InputConfig = InputConfig()
     shell: RoomShellConfig = RoomShellConfig()
     film: FilmConfig = FilmConfig()
+    budget: BudgetConfig = BudgetConfig()
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -105,15 +106,15 @@ def _overrides(options) -> list[str]:
 
 def reconstruct(config: ReconstructConfig, *, resume: bool = False) -> dict:
     """Run the job; returns what metrics.json holds. Raises InputError for whatever is wrong with the input."""
-    started = time.perf_counter()
-    output = Path(config.output)
+    clock, output = Clock(config.budget), Path(config.output)
     views = read_views(config.input)  # a bad view is found before the long part
     files = inputs.fingerprint(config.input)
     write_text(output / "config.toml", _header() + dump_config(config))
+    config = within(config, config.budget)
     with Progress(config) as progress:
         store = StageStore(output / "stages", resume=resume, on_done=progress.done)
-        result = _stages(config, files, store, progress)
-        return _write(config, output, views, store, progress, started, *result)
+        result = _stages(config, files, store, progress, clock)
+        return _write(config, output, views, store, progress, clock, *result)
 
 
 def _header() -> str:
@@ -121,7 +122,7 @@ def _header() -> str:
     return f"# written by rein3d_jax; Python {sys.version.split()[0]}, {versions}; jax on {jax.default_backend()}\n"
 
 
-def _stages(config: ReconstructConfig, files: str, store: StageStore, progress: Progress):
+def _stages(config: ReconstructConfig, files: str, store: StageStore, progress: Progress, clock: Clock):
     """Everything up to the refined scene, each stage saved when it is done."""
     key = jax.random.key(config.seed)
     table = {field.name: dataclasses.asdict(getattr(config, field.name)) for field in dataclasses.fields(Stages)}
@@ -135,16 +136,18 @@ def _stages(config: ReconstructConfig, files: str, store: StageStore, progress: 
     trajectories = store.run(
         "explore", table["explore"], BLANK_TRAJECTORIES(), lambda: radial_trajectories(panorama, config=config.explore)
     )
-    last, videos = None, []
-    for last in _restored(config, table, store, panorama, coarse, trajectories, jax.random.fold_in(key, 0)):
+    videos, revealed = [], []
+    for last in _restored(config, table, store, panorama, coarse, trajectories, jax.random.fold_in(key, 0), clock):
         videos.append(last.video)
+        revealed.append(round(float(last.revealed), 4))
 
     def refine_all():
         chosen = collect_views(panorama, videos, stages=config)
         refine_key = jax.random.fold_in(key, 1)
         arguments = (last.scene, chosen, scene_extent(panorama), refine_key)
         start = store.kept(blank_snapshot(config.refine))
-        return refine_scene(*arguments, stages=config, on_step=progress.step, start=start, on_look=store.keep)
+        told = {"on_step": progress.step, "start": start, "on_look": store.keep, "enough": clock.refined}
+        return refine_scene(*arguments, stages=config, **told)
 
     refined, curves = store.run(
         "refine", table["refine"], (BLANK_SCENE(), blank_snapshot(config.refine).curves), refine_all
@@ -155,14 +158,18 @@ def _stages(config: ReconstructConfig, files: str, store: StageStore, progress: 
         "lift.capacity": int(last.overflow),
         "refine.spare": int(curves["overflow"]),
     }
-    return panorama, origin, coarse, trajectories, videos, refined, curves, overflow
+    trouble = run_metrics.trouble(overflow, curves)
+    chosen = run_metrics.choices(store, revealed, config.explore.trajectories, config.explore.least, curves)
+    return panorama, origin, coarse, trajectories, videos, refined, curves, trouble | chosen
 
 
-def _restored(config, table, store: StageStore, panorama, coarse, trajectories, key):
-    """The state after each trajectory, read where it was saved."""
+def _restored(config, table, store: StageStore, panorama, coarse, trajectories, key, clock):
+    """The state after each trajectory, read where it was saved; the first one is never left out."""
     background, last = room_background(panorama, config.restore), None
     network, weights = read_network(config.restore), weights_fingerprint(config.restore)
     for index in range(config.explore.trajectories):
+        if index and clock.explored():
+            return
 
         def restore_next(index=index, last=last):
             arguments = (coarse, panorama, trajectories, index, last, key)
@@ -189,11 +196,11 @@ BLANK_TRAJECTORIES = partial(_blank, Trajectories, counts=jnp.int32, overflow=jn
 
 
 def _blank_restored() -> Restored:
-    return Restored(BLANK_SCENE(), _blank(Video), jnp.zeros(0, jnp.int32), jnp.zeros(0, jnp.int32))
+    return Restored(BLANK_SCENE(), _blank(Video), jnp.zeros(0), jnp.zeros(0, jnp.int32), jnp.zeros(0, jnp.int32))
 
 
-def _write(config, output, views, store, progress, started, panorama, origin, coarse, trajectories, videos, refined,
-           curves, overflow) -> dict:  # fmt: skip
+def _write(config, output, views, store, progress, clock, panorama, origin, coarse, trajectories, videos, refined,
+           curves, told) -> dict:  # fmt: skip
     """scene.ply, flythrough.mp4, viewer.html, report.html, metrics.json, in the order in which one would miss them."""
     begun = time.perf_counter()
     write_ply(output / "scene.ply", refined, antialias=config.rasterize.antialias)
@@ -204,18 +211,9 @@ def _write(config, output, views, store, progress, started, panorama, origin, co
     ends = _ends(trajectories)
     (coarse_ends, seen), (refined_ends, covered) = (_panoramas(scene, ends, config) for scene in (coarse, refined))
     metrics = {
-        "seconds": {**{k: round(v, 3) for k, v in store.seconds.items()}, "write": 0.0, "total": 0.0},
-        "peak_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
-        "count": {
-            "pixels": int(panorama.distance.size),
-            "lift": int(coarse.alive.sum()),
-            "refined": int(refined.alive.sum()),
-        },
-        "overflow": sum(overflow.values()),
-        "overflows": overflow,
-        "reallocated": int(curves["reallocated"]),
-        "skipped_steps": int(curves["skipped"]),
-        "stopped": {"refine": STOPPED[int(curves["stopped"])]},
+        **run_metrics.cost(store),
+        **run_metrics.size(panorama, coarse, refined, output / "scene.ply"),
+        **told,
         "distance": origin,
         "recipe": recipe_digest(output / "config.toml"),
         "coverage": {"coarse": round(seen, 4), "refined": round(covered, 4)},
@@ -223,7 +221,7 @@ def _write(config, output, views, store, progress, started, panorama, origin, co
     if views:
         metrics["quality"] = {n: quality(p, views) for n, p in zip(("coarse", "refined"), pictures, strict=True)}
     metrics["seconds"]["write"] = round(time.perf_counter() - begun, 3)
-    metrics["seconds"]["total"] = round(time.perf_counter() - started, 3)
+    metrics["seconds"]["total"] = round(clock.elapsed(), 3)
     run = story.Run(config.input, config.explore, panorama, origin, trajectories, videos, coarse_ends, refined_ends,
                     views, *pictures, curves, metrics)  # fmt: skip
     write_text(output / "viewer.html", walkthrough(run, coarse, refined, backdrop, config.rasterize.filter_variance))

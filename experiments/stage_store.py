@@ -21,7 +21,8 @@ class StageStore:
 
     def __init__(self, folder: Path, *, resume: bool, on_done: Callable[[str, float, bool], None]):
         self.folder, self.resume, self.on_done = folder, resume, on_done
-        self.seconds: dict[str, float] = {}
+        self.seconds: dict[str, float] = {}  # by the name's part before "-"
+        self.each: dict[str, float] = {}
         self.key = ""
 
     def run(self, name: str, depends: Any, like: Any, make: Callable[[], Any]) -> Any:
@@ -40,6 +41,7 @@ class StageStore:
         spent = float(stored["seconds"])
         part = name.split("-")[0]
         self.seconds[part] = self.seconds.get(part, 0.0) + spent
+        self.each[name] = spent
         self.on_done(name, spent, found is not None)
         return stored["result"]
 

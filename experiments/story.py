@@ -93,6 +93,11 @@ def _warnings(run: Run):
         if number:
             kind = "frames" if name == "explore.max_frames" else "Gaussians"
             yield f"The capacity was reached: {number:,} {kind} found no room and were left out; raise {name}."
+    if len(run.videos) < len(run.trajectories.counts):
+        yield (
+            f"The seconds of the budget allowed {len(run.videos)} of {len(run.trajectories.counts)} paths; what only "
+            "the others show was not guessed. Raise budget.seconds."
+        )
     if metrics["skipped_steps"]:
         yield f"{metrics['skipped_steps']} refinement steps had values that were not finite, and were skipped."
 
@@ -126,8 +131,9 @@ def _path(run: Run, order: int, index: int) -> Comparison:
     caption = f"Drag: {length:.1f} m from where the panorama was taken, lifted to 3D alone, and refined."
     heading = f"Before and after: the end of path {index + 1}"
     before = _jpeg("lifted only: black is unseen", run.coarse[order])
-    restored = _jpeg("what was guessed there before refining", run.videos[index].rgb[-1])
-    return Comparison(heading, caption, before, _jpeg("refined", run.refined[order]), (restored,))
+    guessed = index < len(run.videos) and len(run.videos[index].rgb) == int(run.trajectories.counts[index])
+    restored = (_jpeg("what was guessed there before refining", run.videos[index].rgb[-1]),) if guessed else ()
+    return Comparison(heading, caption, before, _jpeg("refined", run.refined[order]), restored)
 
 
 def _standing(metrics: dict) -> Scatter:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 
+from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.sphere import azimuths
 
 
@@ -26,6 +27,21 @@ class ExploreConfig:
     view_points: int = 4  # N_fps: evaluation viewpoints besides the origin
     view_samples: int = 2000  # M: Monte Carlo candidates for them
     narrow: float = 0.1  # metres; directions with less room than this hold no viewpoint
+    reach: float = math.inf  # metres that a path goes at most; a short one explores locally
+    least: float = 0.0  # share of the sphere that a path's end must reveal, or the path is left out
+
+    def __post_init__(self):
+        if min(self.trajectories, self.max_frames, self.view_samples) < 1 or self.view_points < 0:
+            raise InputError("explore.trajectories, max_frames and view_samples must be at least 1, view_points 0")
+        if self.step <= 0:
+            raise InputError(f"explore.step {self.step} must be above 0 metres")
+        for name in ("camera_radius", "stop_buffer", "narrow", "reach"):
+            if getattr(self, name) < 0:
+                raise InputError(f"explore.{name} {getattr(self, name)} must not be below 0 metres")
+        if not 0 <= self.band[0] < self.band[1] <= 1:
+            raise InputError(f"explore.band {self.band} must be two shares of the height, the smaller first")
+        if not 0 <= self.least < 1:
+            raise InputError(f"explore.least {self.least} must be a share from 0 to below 1")
 
     @property
     def clearance(self) -> float:

@@ -53,7 +53,7 @@ def _radial_trajectories(panorama: Panorama, *, config: ExploreConfig = ExploreC
     raw = band_profile(panorama.distance, panorama.valid, config=config)
     rotation = _best_rotation(raw, config)
     directions = _fan(rotation, config.trajectories)
-    lengths = travel(safe_distances(raw, directions, config=config), config=config)
+    lengths = jnp.minimum(travel(safe_distances(raw, directions, config=config), config=config), config.reach)
     points = jnp.floor(lengths / config.step).astype(jnp.int32) + 1
     counts = jnp.minimum(points, config.max_frames)
     frames = jnp.minimum(jnp.arange(config.max_frames), counts[:, None] - 1)

@@ -20,7 +20,7 @@ from rein3d_jax.scene import Gaussians
 
 GROW = {"default": densify, "mcmc": relocate}
 CURVES = ("loss", "psnr", "count", "overflow", "reallocated", "skipped", "stopped")
-STOPPED = ("all steps taken", "held-out views stopped improving")
+STOPPED = ("all steps taken", "held-out views stopped improving", "the budget's seconds were spent")
 
 
 @struct.dataclass
@@ -51,6 +51,7 @@ def refine(
     on_step: Callable[[int], None] = lambda step: None,
     start: Snapshot | None = None,
     on_look: Callable[[Snapshot], None] = lambda snapshot: None,
+    enough: Callable[[], bool] = lambda: False,
     run: Callable = steps,
 ) -> tuple[Gaussians, dict[str, np.ndarray]]:
     """Fit `gaussians` to `views` for `config.steps` steps; every `test_every`-th view is only looked at.
@@ -58,8 +59,9 @@ def refine(
     Returns the scene and curves: `loss` (k, 2) of (step, value), `psnr` (k, 2) of (step, held-out dB), `count` (k, 2)
     of (step, Gaussians), and the totals `overflow` (Gaussians that densification had no slot for), `reallocated`,
     `skipped`, and `stopped`, the index in STOPPED of why it ended. `extent` is the scene's size in metres. The same
-    key gives the same bytes, also when it goes on from the `start` that `on_look` was given. `run` takes the steps:
-    `step.steps`, or one that shares them out over devices. Raises InputError where no view is left to train on.
+    key gives the same bytes, also when it goes on from the `start` that `on_look` was given. It ends early where
+    `enough()`. `run` takes the steps: `step.steps`, or one that shares them out over devices. Raises InputError where
+    no view is left to train on.
     """
     total = views.rgb.shape[0]
     held_out = np.arange(0, total, config.test_every)
@@ -78,6 +80,9 @@ def refine(
     backdrops = jax.random.uniform(backdrop_key, (max(config.steps, 1), 3))
     batches = _batches(order_key, training, config)
     while (number := int(state.step)) < config.steps:
+        if enough():
+            curves = curves | {"stopped": np.full((), 2.0)}
+            break
         if number % config.evaluate_every == 0 and (start is None or number > int(start.state.step)):
             raster, curves = _look(state, views, held_out, raster, curves)
             if _flat(curves["psnr"], config):

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from experiments.inputs import SAMPLES
 from rein3d_jax.geometry.poses import pinhole_camera, upright
 from rein3d_jax.io.distance import write_distance_exr
 from rein3d_jax.io.image import write_rgb
@@ -14,6 +15,29 @@ from rein3d_jax.io.posed_panorama import UNTURNED, rays_of_pose
 WALLS = np.array([3.0, 2.5, 1.4])  # half sizes, metres; the input stands in the middle
 CHEST = np.array([[1.0, -0.6, -1.4], [1.6, 0.5, 0.2]])  # two opposite corners
 ELSEWHERE = (0.4, 1.2, 0.0)  # sees what the chest hides from the input
+RECIPE = """
+[input]
+height = 64
+[explore]
+trajectories = 2
+step = 0.8
+[restore]
+height = 64
+[refine]
+steps = 4
+batch = 1
+crop = 32
+sh_degree = 0
+evaluate_every = 2
+densify_start = 2
+densify_every = 2
+densify_stop = 4
+[film]
+width = 64
+height = 48
+step = 0.8
+turn = 0.8
+"""
 
 
 def seen(eye, rays):
@@ -57,6 +81,18 @@ def write_room(folder):
         "video": [panorama(f"video{i}", (0.0, 0.3 * i, 0.0), 32, depth=False) for i in range(4)],
     }
     (folder / "scene.json").write_text(json.dumps(scene))
+
+
+@pytest.fixture(scope="session")
+def recipe(tmp_path_factory):
+    """A recipe of seconds on the packaged room, with 6 of its 24 ground-truth views."""
+    folder = tmp_path_factory.mktemp("recipe")
+    scene = json.loads((SAMPLES / "room" / "scene.json").read_text())
+    views = [view | {"rgb": str(SAMPLES / "room" / view["rgb"])} for view in scene["views"][::4]]
+    (folder / "scene.json").write_text(json.dumps({"views": views}))
+    path = folder / "tiny.toml"
+    path.write_text(RECIPE.replace("[input]", f"[input]\nviews = {json.dumps(str(folder / 'scene.json'))}"))
+    return path
 
 
 @pytest.fixture(scope="session")
@@ -120,7 +156,8 @@ def run_folder(rooms, tmp_path_factory):
         truth = [seen(pose[:3, 3], np.asarray(rays_at(pose, 64, 128))) for pose in poses]
         rgb, distance = (np.float32(part) for part in zip(*truth, strict=True))
         video = Video(rgb, np.ones_like(distance), distance, poses)
-        stage(f"restore-{index:02d}", Restored(coarse, video, np.zeros((), np.int32), np.zeros(4, np.int32)))
+        shared, nothing, buffers = np.zeros((), np.float32), np.zeros((), np.int32), np.zeros(4, np.int32)
+        stage(f"restore-{index:02d}", Restored(coarse, video, shared, nothing, buffers))
     write_ply(folder / "scene.ply", coarse)
     (folder / "config.toml").write_text(dump_config(config))
     return folder

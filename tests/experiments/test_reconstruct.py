@@ -19,41 +19,6 @@ from rein3d_jax.io.ply import read_ply
 from rein3d_jax.rasterize import RasterizeConfig, render
 from rein3d_jax.refine import RefineConfig, blank_snapshot
 
-RECIPE = """
-[input]
-height = 64
-[explore]
-trajectories = 2
-step = 0.8
-[restore]
-height = 64
-[refine]
-steps = 4
-batch = 1
-crop = 32
-sh_degree = 0
-evaluate_every = 2
-densify_start = 2
-densify_every = 2
-densify_stop = 4
-[film]
-width = 64
-height = 48
-step = 0.8
-turn = 0.8
-"""
-
-
-@pytest.fixture(scope="module")
-def recipe(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("recipe")
-    scene = json.loads((SAMPLES / "room" / "scene.json").read_text())
-    views = [view | {"rgb": str(SAMPLES / "room" / view["rgb"])} for view in scene["views"][::4]]
-    (folder / "scene.json").write_text(json.dumps({"views": views}))
-    path = folder / "tiny.toml"
-    path.write_text(RECIPE.replace("[input]", f"[input]\nviews = {json.dumps(str(folder / 'scene.json'))}"))
-    return path
-
 
 @pytest.fixture(scope="module")
 def finished(recipe, tmp_path_factory):

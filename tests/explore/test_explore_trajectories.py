@@ -1,5 +1,6 @@
 """Laws of Algorithm 1."""
 
+import dataclasses
 from dataclasses import replace
 
 import jax
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rein3d_jax.errors import InputError
 from rein3d_jax.explore.profile import ExploreConfig
 from rein3d_jax.explore.trajectories import Trajectories, radial_trajectories
 from rein3d_jax.geometry.sphere import pixel_rays, world_from_camera_axes
@@ -128,3 +130,20 @@ def test_any_number_of_trajectories(count: int) -> None:
     points = np.asarray(pixel_rays(HEIGHT, WIDTH) * profile[:, None])[9:11].reshape(-1, 1, 3)
     gap = np.linalg.norm(points - used(paths), axis=-1)
     assert np.all(gap >= np.minimum(np.linalg.norm(points, axis=-1), CONFIG.clearance) - 1e-5)
+
+
+@pytest.mark.parametrize("reach", [0.0, 0.6, 100.0])
+def test_no_path_goes_beyond_its_reach_and_a_far_one_changes_nothing(reach: float) -> None:
+    free = radial_trajectories(panorama(random_profile(3)), config=CONFIG)
+    held = radial_trajectories(panorama(random_profile(3)), config=dataclasses.replace(CONFIG, reach=reach))
+    np.testing.assert_array_equal(held.lengths, np.minimum(free.lengths, np.float32(reach)))
+    np.testing.assert_array_equal(held.directions, free.directions)
+    assert np.all(np.linalg.norm(np.asarray(held.positions), axis=-1) <= reach + 1e-6)  # float32 unit vectors
+
+
+@pytest.mark.parametrize(
+    "bad", [{"trajectories": 0}, {"step": 0.0}, {"reach": -1.0}, {"band": (0.6, 0.4)}, {"least": 1.0}]
+)
+def test_bad_settings_are_refused_by_name(bad: dict) -> None:
+    with pytest.raises(InputError, match=next(iter(bad))):
+        ExploreConfig(**bad)
