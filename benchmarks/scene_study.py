@@ -37,17 +37,17 @@ from rein3d_jax.io.atomic import write_text
 from rein3d_jax.scene import Gaussians
 
 RECIPE = "experiments/recipes/quick.toml"
-SIZE = ("input.height=128", "restore.height=128", "refine.crop=64")
-GROWING = ("refine.steps=150", "refine.densify_start=25", "refine.densify_every=25", "refine.densify_stop=126",
-           "refine.spare=0.2")  # fmt: skip
-AUTOMATIC = ("explore.least=0.01", "lift.share=0.5", "refine.steps=0")
+SIZE = ("input.height=128", "restore.height=128", "refine.crop=64", "refine.steps=200", "refine.evaluate_every=200")
+GROWING = ("refine.densify_start=25", "refine.densify_every=25", "refine.densify_stop=151", "refine.spare=0.2")
+AUTOMATIC = ("explore.least=0.01", "lift.share=0.5", "refine.steps=400", "refine.evaluate_every=100",
+             "refine.plateau=0.1", "refine.patience=1")  # fmt: skip
 
 
 def tables() -> dict[str, dict[str, tuple[str, ...]]]:
     """Rows by table: name -> the recipe's keys that it changes. The first row is the one that others are held to."""
     local = ("explore.reach=0.5", "explore.step=0.25")
     weights = {f"guesses weigh {w}": (f"refine.restored_weight={w}",) for w in (0.5, 1.0, 0.25)}
-    grid = itertools.product((0.25, 0.5, 1.0), (2, 4, 8), (0, 50, 150))
+    grid = itertools.product((0.25, 0.5, 1.0), (2, 4, 8), (0, 100, 400))
     return {
         "exploration": {
             "radial, 8 paths": (),
@@ -61,7 +61,7 @@ def tables() -> dict[str, dict[str, tuple[str, ...]]]:
         "weights": weights
         | {
             "a tint for each path": ("refine.colour_rate=1e-3",),
-            "whole panoramas": ("refine.panoramic=true", "refine.crop=64"),
+            "whole panoramas": ("refine.panoramic=true",),
             "distances of the input": ("refine.distance_weight=0.1",),
             "harmonics of degree 1": ("refine.sh_degree=1", "refine.sh_degree_every=1"),
         },

@@ -46,14 +46,18 @@ def _best_rotation(raw: jax.Array, config: ExploreConfig) -> jax.Array:
 
 
 def _radial_trajectories(panorama: Panorama, *, config: ExploreConfig = ExploreConfig()) -> Trajectories:
-    """The tau paths { k step v | k step <= l }, v = (cos phi, -sin phi, 0), that see the most (Algorithm 1, whole).
+    """The tau paths { k step v | k step <= l }, v = (cos phi, -sin phi, 0), that see the most (Algorithm 1, whole),
+    longest first.
 
     `panorama` (h, w) stands at the origin, unturned. Where the origin has no room the path is the origin alone.
     """
     raw = band_profile(panorama.distance, panorama.valid, config=config)
     rotation = _best_rotation(raw, config)
     directions = _fan(rotation, config.trajectories)
-    lengths = jnp.minimum(travel(safe_distances(raw, directions, config=config), config=config), config.reach)
+    free = travel(safe_distances(raw, directions, config=config), config=config)
+    # The longest reveals most, and what is guessed there is of one piece: it goes first (benchmarks/NOTES.md).
+    order = jnp.argsort(-free, stable=True)
+    directions, lengths = directions[order], jnp.minimum(free[order], config.reach)
     points = jnp.floor(lengths / config.step).astype(jnp.int32) + 1
     counts = jnp.minimum(points, config.max_frames)
     frames = jnp.minimum(jnp.arange(config.max_frames), counts[:, None] - 1)

@@ -122,10 +122,13 @@ def test_without_room_every_path_is_the_origin(nothing: str) -> None:
 
 @pytest.mark.parametrize("count", [1, 7, 64, 100])
 def test_any_number_of_trajectories(count: int) -> None:
-    """One, a number that does not divide the columns, and more than there are columns: an even fan, all of it safe."""
+    """One, a number that does not divide the columns, and more than there are columns: an even fan, all of it safe,
+    the longest path first."""
     profile = random_profile(3)
     paths = radial_trajectories(panorama(profile), config=replace(CONFIG, trajectories=count))
-    np.testing.assert_allclose(np.diff(paths.directions), 2 * np.pi / count, atol=1e-5)  # float32 angles up to 2 pi
+    fan = np.sort(paths.directions)
+    np.testing.assert_allclose(np.diff(fan), 2 * np.pi / count, atol=1e-5)  # float32 angles up to 2 pi
+    assert np.all(np.diff(paths.lengths) <= 0)
     assert paths.counts.shape == (count,)
     points = np.asarray(pixel_rays(HEIGHT, WIDTH) * profile[:, None])[9:11].reshape(-1, 1, 3)
     gap = np.linalg.norm(points - used(paths), axis=-1)
