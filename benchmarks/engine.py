@@ -11,5 +11,6 @@ class Engine:
     forward: Callable
     gradient: Callable
     wait: Callable
+    step: Callable | None = None  # forward, gradient and Adam's update of all leaves, from where the last one ended
     facts: dict = dataclasses.field(default_factory=dict)  # counts that belong to its rows
     parts: dict = dataclasses.field(default_factory=dict)  # stage -> call

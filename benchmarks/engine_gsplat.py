@@ -119,4 +119,11 @@ def build(workload: Workload, own_lists: bool = True) -> Engine:
     def gradient():
         return torch.autograd.grad(torch.mean((draw() - target) ** 2), leaves)
 
-    return Engine(forward, gradient, lambda result: result)
+    adam = torch.optim.Adam(leaves, lr=1e-3, eps=1e-15)
+
+    def step():
+        for leaf, slope in zip(leaves, gradient(), strict=True):
+            leaf.grad = slope
+        adam.step()
+
+    return Engine(forward, gradient, lambda result: result, step)

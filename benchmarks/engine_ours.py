@@ -1,8 +1,11 @@
 """rein3d_jax's rasterizer as an engine: `build(workload)` gives what one picture and one gradient take."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
+import optax
 
 from benchmarks.engine import Engine
 from benchmarks.workloads import Workload
@@ -13,6 +16,8 @@ from rein3d_jax.rasterize.cull import gather_in_view, in_view
 from rein3d_jax.rasterize.pixels import from_tiles
 from rein3d_jax.rasterize.project import project
 from rein3d_jax.rasterize.tile import bin_splats
+from rein3d_jax.refine import RefineConfig
+from rein3d_jax.refine.parameters import join_parameters, make_optimizer, split_parameters
 from rein3d_jax.scene import Camera, Gaussians
 
 CONFIG = RasterizeConfig(antialias=False, distance=False)  # what the peers composite: colour and alpha
@@ -53,6 +58,7 @@ def build(workload: Workload) -> Engine:
         forward=lambda: rasterize(scene, camera, config=config),
         gradient=lambda: gradient(floats),
         wait=jax.block_until_ready,
+        step=_stepper(scene, camera, target, config),
         facts={
             "visible": int(needed[0]),
             "pairs": int(needed[2]),
@@ -61,6 +67,30 @@ def build(workload: Workload) -> Engine:
         },
         parts=_parts(scene, camera, config),
     )
+
+
+def _stepper(scene, camera, target, config):
+    """The refinement's own optimizer on the workload's loss."""
+    optimizer = make_optimizer(RefineConfig(sh_degree=0))
+
+    def loss(parameters):
+        frame = rasterize(join_parameters(parameters, scene.alive), camera, config=config)
+        return jnp.mean((frame.rgb - target) ** 2)
+
+    @partial(jax.jit, donate_argnums=0)
+    def advance(state):
+        parameters, memory = state
+        updates, memory = optimizer.update(jax.grad(loss)(parameters), memory, parameters)
+        return optax.apply_updates(parameters, updates), memory
+
+    parameters = split_parameters(jax.tree.map(jnp.copy, scene))
+    held = [(parameters, optimizer.init(parameters))]
+
+    def step():
+        held[0] = advance(held[0])
+        return held[0]
+
+    return step
 
 
 def _parts(scene, camera, config):

@@ -38,7 +38,7 @@ def _one_workload(name, engines, rounds):
     for _ in range(rounds):
         for what in ("forward", "gradient"):
             for engine, worker in workers.items():
-                times[engine, what].append(_turn(worker, what))
+                times[engine, what].append(turn(worker, what))
     parts = {engine: _shares(worker) for engine, worker in workers.items()}
     rows = [_row(name, engine, worker, times, parts[engine]) for engine, worker in workers.items()]
     ours = "rein3d_jax"
@@ -48,7 +48,7 @@ def _one_workload(name, engines, rounds):
     return rows, ratios
 
 
-def _turn(worker, what):
+def turn(worker: Worker, what: str) -> tuple[float, float]:
     """Median (wall, CPU) seconds of one engine's turn, after a warm-up call."""
     first = worker.ask(what)[0][0]
     samples = worker.ask(what, max(1, min(15, int(ENOUGH / first))))

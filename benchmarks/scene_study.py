@@ -1,6 +1,6 @@
 """What each choice of the main job buys: a table of variants over rooms, PSNR at novel views, count and seconds.
 
-    python -m benchmarks.scene_study exploration|weights|steps|seeds|choice [--rooms ../shared/rooms] [--json FILE]
+    python -m benchmarks.scene_study TABLE [--rooms ../shared/rooms] [--limit N] [--json FILE]
 
 Every row is quick.toml at half its size with some keys changed. Stages that two rows share are made once. Seconds are
 those of a row's stages, the median over rooms: the first ones compile.
@@ -64,6 +64,15 @@ def tables() -> dict[str, dict[str, tuple[str, ...]]]:
             "whole panoramas": ("refine.panoramic=true",),
             "distances of the input": ("refine.distance_weight=0.1",),
             "harmonics of degree 1": ("refine.sh_degree=1", "refine.sh_degree_every=1"),
+        },
+        "parsimony": {
+            "one a pixel": (),
+            "share 0.5": ("lift.share=0.5",),
+            "share 0.25": ("lift.share=0.25",),
+            "share 0.15": ("lift.share=0.15",),
+            "duplicates merged once": ("refine.duplicates=1",),
+            "duplicates merged three times": ("refine.duplicates=3",),
+            "share 0.5, duplicates merged twice": ("lift.share=0.5", "refine.duplicates=2"),
         },
         "steps": {f"{steps} steps": (f"refine.steps={steps}",) for steps in (0, 50, 150, 400, 1000, 2000)},
         "seeds": {

@@ -28,7 +28,7 @@ class Worker:
         self.facts = self._receive()
 
     def ask(self, what: str, repeats: int = 1) -> list[tuple[float, float]]:
-        """Time "forward", "gradient" or one of the engine's parts."""
+        """Time "forward", "gradient", "step" or one of the engine's parts."""
         self._pipe.send((what, repeats))
         return self._receive()
 
@@ -62,7 +62,7 @@ def _serve(pipe, name: str, workload_name: str) -> None:
     except Exception as error:
         pipe.send(RuntimeError(f"{name}: {type(error).__name__}: {error}"))
         return
-    calls = {"forward": engine.forward, "gradient": engine.gradient, **engine.parts}
+    calls = {"forward": engine.forward, "gradient": engine.gradient, "step": engine.step, **engine.parts}
     while True:
         what, repeats = pipe.recv()
         pipe.send(_peak() - before if what == "peak" else [_timed(calls[what], engine.wait) for _ in range(repeats)])

@@ -18,8 +18,9 @@ from rein3d_jax.geometry.poses import equirectangular_camera, rigid
 from rein3d_jax.geometry.sphere import rays_of_pose, world_from_camera_axes
 from rein3d_jax.lift import LiftConfig, compact, lift, lift_adaptively, merge, with_capacity
 from rein3d_jax.parallel import data_mesh
-from rein3d_jax.rasterize import RasterizeConfig, allocate, enlarge, render
+from rein3d_jax.rasterize import RasterizeConfig, allocate, bucket, enlarge, render
 from rein3d_jax.refine import RefineConfig, Views, join_views, refine, views_from_panorama
+from rein3d_jax.refine.merge_duplicates import merge_duplicates
 from rein3d_jax.refine.prune import contribution, prune_to, prune_within
 from rein3d_jax.refine.views import camera_of
 from rein3d_jax.restore import Background, Network, RestoreConfig, background_of, restorer
@@ -174,14 +175,18 @@ WEIGHED = 48  # views, evenly through the list, by which a scene is pruned
 
 
 def _needed(scene: Gaussians, views: Views, stages: Stages) -> Gaussians:
-    """What the views need of the scene, within the budget, in a buffer with room to grow."""
+    """What the views need of the scene, within the budget, in a buffer with room to grow. Buffers of rounded size: the
+    next scene's program is then compiled already."""
     config = stages.refine
+    for _ in range(config.duplicates):
+        scene = merge_duplicates(scene)
     if config.needless > 0 or 0 < config.most < int(scene.alive.sum()):
         chosen = np.unique(np.linspace(0, len(views.rgb) - 1, WEIGHED).astype(int))
         weight = contribution(scene, [camera_of(views, int(i)) for i in chosen], config=stages.rasterize)
         scene = prune_within(scene, weight, config.needless)
         scene = prune_to(scene, weight, config.most) if config.most else scene
     scene = compact(scene, spare=config.spare)
+    scene = with_capacity(scene, bucket(scene.alive.shape[0]))
     if 0 < config.most < scene.alive.shape[0]:
         scene = jax.tree.map(lambda x: x[: config.most], scene)  # the living come first
     return scene

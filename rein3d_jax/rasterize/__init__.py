@@ -2,13 +2,14 @@
 
 from rein3d_jax.rasterize.config import RasterizeConfig
 from rein3d_jax.rasterize.contribution import accumulated_weight, median_distance
-from rein3d_jax.rasterize.rasterize import Frame, allocate, enlarge, rasterize, render
+from rein3d_jax.rasterize.rasterize import Frame, allocate, bucket, enlarge, rasterize, render
 
 __all__ = [
     "Frame",
     "RasterizeConfig",
     "accumulated_weight",
     "allocate",
+    "bucket",
     "enlarge",
     "median_distance",
     "rasterize",

@@ -81,7 +81,7 @@ def _measure(gaussians, camera, *, config):
 _measure = jax.jit(_measure, static_argnames=("config",))
 
 
-def _bucket(count: int) -> int:
+def bucket(count: int) -> int:
     """The next of 1, 1.25, 1.5, 1.75 x 2^k: near sizes share a compiled program, at most 25 % is idle."""
     count = max(count, 64)
     step = 1 << max(count.bit_length() - 3, 0)
@@ -103,7 +103,7 @@ def allocate(gaussians: Gaussians, cameras: Sequence[Camera], *, config: Rasteri
 def enlarge(config: RasterizeConfig, *needed: int) -> RasterizeConfig:
     """The config with buffers of at least the sizes `needed`, in the order of `RasterizeConfig.buffers`, never
     smaller than it had."""
-    visible, rows, pairs, chunks = (max(old, _bucket(new)) for old, new in zip(config.buffers, needed, strict=True))
+    visible, rows, pairs, chunks = (max(old, bucket(new)) for old, new in zip(config.buffers, needed, strict=True))
     return dataclasses.replace(
         config, visible_capacity=visible, row_capacity=rows, pair_capacity=pairs, chunk_capacity=chunks
     )

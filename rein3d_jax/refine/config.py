@@ -49,6 +49,7 @@ class RefineConfig:
     densify_gradient: float = 2e-4  # mean 2D gradient, in half image widths, over which a Gaussian is cloned or split
     densify_share: float = 0.05  # of the buffer, at most, added at a time
     split_size: float = 0.01  # share of the extent over which a Gaussian is split, not cloned
+    duplicates: int = 0  # times that pairs of near-duplicates are made one before it begins; see merge_duplicates.py
     needless: float = 0.0  # mean change of the views for which Gaussians are left out before it begins; see prune.py
     most: int = 0  # Gaussians, a budget: the ones that the views need least are left out, none grow beyond. 0: no limit
     prune_opacity: float = 0.005

@@ -5,10 +5,12 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from rein3d_jax.conventions import EQUIRECTANGULAR, PINHOLE
 from rein3d_jax.errors import InputError
-from rein3d_jax.rasterize import RasterizeConfig, allocate, rasterize, render
+from rein3d_jax.rasterize import RasterizeConfig, allocate, bucket, rasterize, render
 
 BUFFERS = ("visible_capacity", "row_capacity", "pair_capacity", "chunk_capacity")
 
@@ -54,3 +56,10 @@ def test_a_tile_that_does_not_divide_the_width_is_refused(scene_of, camera_of, r
     config = dataclasses.replace(roomy, tile=12)
     with pytest.raises(InputError, match=r"rasterize.tile 12 .* width 32"):
         rasterize(scene_of(), camera_of(EQUIRECTANGULAR), config=config)
+
+
+@settings(deadline=None)
+@given(st.integers(64, 2**30), st.integers(0, 1000))
+def test_a_bucket_holds_its_count_wastes_a_quarter_at_most_and_never_shrinks(count: int, more: int) -> None:
+    assert count <= bucket(count) <= 1.25 * count and bucket(count) <= bucket(count + more)
+    assert bucket(bucket(count)) == bucket(count)

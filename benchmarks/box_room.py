@@ -1,0 +1,79 @@
+"""A box room in closed form: patterned, white, or with a mirror for a wall; seen from anywhere, lifted, or as views.
+For `benchmarks.stability`."""
+
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from rein3d_jax.geometry.poses import rigid
+from rein3d_jax.geometry.shell import RoomShell, meet_shell, world_from_shell
+from rein3d_jax.geometry.sphere import rays_of_pose, world_from_camera_axes
+from rein3d_jax.lift import LiftConfig, lift, with_capacity
+from rein3d_jax.refine import RefineConfig, Views, join_views, views_from_panorama
+from rein3d_jax.scene import Gaussians, Panorama
+
+HEIGHT = 32  # rows of a panorama: 2,048 Gaussians
+BOX = RoomShell(*(jnp.asarray(x) for x in (0.2, (2.2, 1.8, 2.4, 1.6), 1.5, 1.2)))
+MIRROR = 0  # the face that is one, in the mirror room
+PLACES = [0.7 * np.array([np.cos(a), np.sin(a), 0.3 * np.sin(3 * a)]) for a in np.arange(6) * np.pi / 3]  # fitted to
+
+Paint = Callable[[jax.Array, jax.Array, jax.Array], jax.Array]  # points, faces, rays -> colours
+
+
+def pattern(points: jax.Array, face: jax.Array, rays: jax.Array) -> jax.Array:
+    """Waves of 0.9 to 1.6 m, of another tint on each face."""
+    tint = 0.15 * jnp.sin(face[..., None] * jnp.array([1.0, 2.3, 3.7]) + jnp.array([0.0, 1.0, 2.0]))
+    waves = jnp.stack([jnp.sin(points @ jnp.array(k)) for k in ((7.0, 1, 2), (1, 6.0, 3), (2, 3, 5.0))], axis=-1)
+    return 0.5 + tint + 0.25 * waves
+
+
+def white(points: jax.Array, face: jax.Array, rays: jax.Array) -> jax.Array:
+    """One flat colour."""
+    return jnp.full_like(points, 0.9)
+
+
+def mirrored(points: jax.Array, face: jax.Array, rays: jax.Array) -> jax.Array:
+    """The pattern; on the mirror, what a ray that it throws back meets."""
+    normal = world_from_shell(BOX)[:, 0]
+    back = rays - 2 * (rays @ normal)[..., None] * normal
+    inside = (points - 1e-3 * normal).reshape(-1, 3)
+    reach, other = (x.reshape(face.shape) for x in jax.vmap(meet_shell, (None, 0, 0))(BOX, inside, back.reshape(-1, 3)))
+    seen = pattern(points + reach[..., None] * back, other, back)
+    return jnp.where((face == MIRROR)[..., None], 0.9 * seen, pattern(points, face, rays))
+
+
+def pose_at(place) -> jax.Array:
+    """world_from_camera of an unturned panorama."""
+    return rigid(world_from_camera_axes(), jnp.asarray(place, jnp.float32))
+
+
+def look(place, paint: Paint) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """(rgb, distance, face) of the box from `place`: the truth."""
+    rays = rays_of_pose(pose_at(place), HEIGHT, 2 * HEIGHT)
+    distance, face = meet_shell(BOX, jnp.asarray(place, jnp.float32), rays)
+    return paint(jnp.asarray(place) + distance[..., None] * rays, face, rays), distance, face
+
+
+def lifted(paint: Paint, *, unit: float = 1.0, spare: float = 1.0, noise: float = 0.0) -> Gaussians:
+    """The box as it is from the origin, in `unit`s of length, distances off by a share of `noise`."""
+    rgb, distance, _ = look(np.zeros(3), paint)
+    distance *= unit * jnp.exp(noise * jax.random.normal(jax.random.key(0), distance.shape))
+    everywhere = jnp.ones(distance.shape, bool)
+    scene = lift(Panorama(rgb, distance, everywhere), pose_at(np.zeros(3)), everywhere, config=LiftConfig())
+    return with_capacity(scene, int(scene.alive.size * (1 + spare)))
+
+
+def views_of(
+    paint: Paint, config: RefineConfig, *, unit: float = 1.0, tint=lambda source: 0.0, weight=lambda source: 1.0
+) -> Views:
+    """Of the box from the origin (source 0) and from PLACES (sources 1 and 2 by turns)."""
+    parts = []
+    for index, place in enumerate([np.zeros(3), *PLACES]):
+        source = 0 if index == 0 else 1 + index % 2
+        rgb, distance, _ = look(place, paint)
+        known = unit * distance if source == 0 else jnp.zeros_like(distance)  # as the pipeline's: the input's alone
+        frame = (rgb + tint(source), weight(source) * jnp.ones_like(distance), known, pose_at(unit * place))
+        parts.append(views_from_panorama(*frame, source=source, turn=0.3 * index, config=config))
+    return join_views(*parts)
