@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from benchmarks.scene_study import GROWING, RECIPE, SIZE, Bench, summary
+from experiments.compiled_programs import forget_when_many
 from experiments.config import load_config
 from experiments.evaluation.room import Room, room_folders
 from experiments.pipeline import WEIGHED, Stages, collect_views, scene_extent
@@ -73,6 +74,7 @@ def measure(folder: Path, config: ReconstructConfig) -> dict[str, dict]:
             row = {"psnr": found, "count": int(jnp.sum(scene.alive)), "seconds": 0.0, "paths": len(states)}
             rows[f"{method}, {budget:.0%}"] = row
             print(folder.name, method, budget, row, flush=True)
+            forget_when_many()
     return rows
 
 

@@ -17,6 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from experiments.compiled_programs import forget_when_many
 from experiments.config import load_config
 from experiments.evaluation.room import Room, room_folders
 from experiments.pipeline import (
@@ -47,7 +48,7 @@ def tables() -> dict[str, dict[str, tuple[str, ...]]]:
     """Rows by table: name -> the recipe's keys that it changes. The first row is the one that others are held to."""
     local = ("explore.reach=0.5", "explore.step=0.25")
     weights = {f"guesses weigh {w}": (f"refine.restored_weight={w}",) for w in (0.5, 1.0, 0.25)}
-    grid = itertools.product((0.25, 0.5, 1.0), (2, 4, 8), (0, 100, 400))
+    grid = itertools.product((0.25, 0.5, 1.0), (2, 4, 8), (0, 400))
     return {
         "exploration": {
             "radial, 8 paths": (),
@@ -169,6 +170,7 @@ def measure(variants: dict[str, tuple[str, ...]], folders: list[Path]) -> dict[s
         for name, keys in variants.items():
             found[name].append(bench.row(load_config(ReconstructConfig, RECIPE, [*SIZE, *keys])))
             print(folder.name, name, found[name][-1], flush=True)
+            forget_when_many()
     return found
 
 

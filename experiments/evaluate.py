@@ -23,6 +23,7 @@ from pathlib import Path
 import jax
 
 from experiments.compile_cache import use_compile_cache
+from experiments.compiled_programs import forget_when_many
 from experiments.config import load_config
 from experiments.evaluation.chart import chart
 from experiments.evaluation.methods import REFINED, chosen, recipe_of
@@ -127,7 +128,7 @@ def _measure(folders: list[Path], jobs: list[tuple[str, list[str]]], options, co
             file = work / protocol / room.name / f"{method}.json"
             by_room[room.name], found = kept(file, depends, partial(PROTOCOLS[protocol][0], method, room, tools))
             print(line(protocol, method, room.name, by_room[room.name].figures, found), flush=True)
-        jax.clear_caches()  # each room compiles for sizes of its own, and a process may map only so much code
+        forget_when_many()  # each room compiles for sizes of its own
     features = "alexnet" if options.i3d is None else "i3d"
     return {
         protocol: {method: table(outcomes[protocol, method], features) for method in methods}

@@ -4,25 +4,18 @@ Value and gradient of the rasterizer: 13.5 s to compile as for use, 1.6 s with t
 user's own XLA_FLAGS come last and win.
 """
 
-import gc
 import os
-from pathlib import Path
 
 import pytest
 
 FAST_TO_COMPILE = "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false"
 os.environ["XLA_FLAGS"] = f"{FAST_TO_COMPILE} {os.environ.get('XLA_FLAGS', '')}".strip()
 
-import jax  # noqa: E402
-
-MAPS = Path("/proc/self/maps")
-MANY = 16_000  # Linux allows a process 65,530; a program that XLA compiled holds several, and at the limit XLA hangs
+from experiments.compiled_programs import forget_when_many  # noqa: E402
 
 
 @pytest.fixture(autouse=True, scope="module")
 def forget_programs():
     """Lets go of the compiled programs of the tests so far where they have become many."""
     yield
-    if MAPS.exists() and MAPS.read_bytes().count(b"\n") > MANY:
-        jax.clear_caches()
-        gc.collect()
+    forget_when_many()
