@@ -26,6 +26,7 @@ from rein3d_jax.refine.views import camera_of
 from rein3d_jax.restore import Background, Network, RestoreConfig, background_of, restorer
 from rein3d_jax.scene import Gaussians, Panorama, Video
 
+MOVED = 1e-3  # relative: more than rounding, less than the least move of hidden_distance
 GOLDEN_TURN = 2.399963  # radians: successive multiples spread the cuts between a trajectory's views evenly
 
 
@@ -70,6 +71,8 @@ def _fuse(scene: Gaussians, degraded: Video, restored: Video, panorama: Panorama
     overflow, last = 0, restored.rgb.shape[0] - 1
     # Edges were snapped when the input was lifted; a guess has none to mend, and every pixel of it is lifted.
     config = dataclasses.replace(stages.lift, snap_edges=False, stride=1)
+    # One that had to move lies on no surface that anybody saw: stretched along its neighbours it made fog.
+    round_ones = dataclasses.replace(config, steepest=0.0)
     for index in range(last, 0, -stages.restore.fuse_every):
         camera = equirectangular_camera(restored.world_from_camera[index], restored.rgb.shape[1])
         alpha = degraded.alpha[index]
@@ -77,8 +80,10 @@ def _fuse(scene: Gaussians, degraded: Video, restored: Video, panorama: Panorama
             frame, raster = render(scene, camera, config=raster)
             alpha = frame.alpha
         guess, hole = _guess(restored, index, alpha, panorama, stages)
-        scene, dropped = merge(scene, lift(guess, camera.world_from_camera, hole, config=config))
-        overflow += int(dropped)
+        moved = jnp.abs(guess.distance - restored.distance[index]) > MOVED * guess.distance
+        for part, config_of_part in ((hole & ~moved, config), (hole & moved, round_ones)):
+            scene, dropped = merge(scene, lift(guess, camera.world_from_camera, part, config=config_of_part))
+            overflow += int(dropped)
     return scene, overflow, raster
 
 

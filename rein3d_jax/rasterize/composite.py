@@ -18,7 +18,7 @@ import jax.numpy as jnp
 from rein3d_jax.conventions import ALPHA_CUT, ALPHA_MAX
 from rein3d_jax.rasterize.pixels import tile_pixels
 from rein3d_jax.rasterize.project import Splats
-from rein3d_jax.rasterize.quadratic import axes_entries, coefficients, evaluate, monomials, terms
+from rein3d_jax.rasterize.quadratic import axes_entries, coefficients, evaluate, monomials, slopes, terms
 from rein3d_jax.rasterize.tile import Chunks
 from rein3d_jax.scene import Camera
 
@@ -131,18 +131,19 @@ def _before(through, chunks):
 
 
 @jax.custom_vjp
-def composite(table: jax.Array, anchors: jax.Array, pixels: jax.Array, chunks: Chunks) -> jax.Array:
+def composite(table: jax.Array, anchors: jax.Array, pixels: jax.Array, chunks: Chunks, strain=None) -> jax.Array:
     """`splat_table`, anchors (tiles, k), pixels (1 or tiles, k, p) relative to them -> image (tiles, v + 1, p): the
-    weighted values and, last, alpha. Differentiable in `table` only."""
-    return _composite_forward(table, anchors, pixels, chunks)[0]
+    weighted values and, last, alpha. Differentiable in `table` only. `strain` (n + 1,) changes nothing; what stands for
+    its gradient is each splat's sum over pixels of the length of the gradient by its mean (AbsGS, Ye et al. 2024)."""
+    return _composite_forward(table, anchors, pixels, chunks, strain)[0]
 
 
-def _composite_forward(table, anchors, pixels, chunks):
+def _composite_forward(table, anchors, pixels, chunks, strain):
     layers, tiles = _chunk_layers(table, anchors, pixels, chunks), anchors.shape[0]
     before = _before(layers[:, -1], chunks)
     layers = layers.at[:, -1].set(1.0 - layers[:, -1]) * before[:, None]
     image = jax.ops.segment_sum(layers, chunks.tile, num_segments=tiles + 1)[:tiles]
-    return image, (table, anchors, pixels, chunks, before, layers, image)
+    return image, (table, anchors, pixels, chunks, strain, before, layers, image)
 
 
 def _still_to_come(gradient, layers, image, chunks):
@@ -166,19 +167,19 @@ def _moments(power, planes):
 def _composite_backward(residuals, gradient):
     """d L / d alpha_i = T_i (value_i . g) - (sum_{j>i} w_j value_j . g) / (1 - alpha_i), with alpha's own
     channel counted as a value of 1. `rest` carries the sum still behind, this one included."""
-    table, anchors, pixels, chunks, before, layers, image = residuals
+    table, anchors, pixels, chunks, strain, before, layers, image = residuals
     rest = _still_to_come(gradient, layers, image, chunks)
     blocks, ones = _Blocks(chunks, anchors, pixels), jnp.ones(pixels.shape[2], table.dtype)
 
-    def reverse_block(index, of_slots):
+    def reverse_block(index, of_all):
         near, planes = blocks.by_tile(anchors, index), blocks.planes(index)
         pull = list(jnp.moveaxis(blocks.by_tile(gradient, index), 1, 0))
 
         def turn(number, state):
-            through, rest, of_slots = state
+            through, rest, of_slots, lengths = state
             rows = blocks.rows(table, index, number)
             (of_terms, of_values), chain = jax.vjp(lambda x: _unpack(x, near), rows)
-            powers, weights = [], []
+            powers, weights, pulls = [], [], []
             for u in range(blocks.turn):
                 raw, alpha = _alpha([c[u] for c in of_terms], planes)
                 weight = alpha * through
@@ -188,29 +189,38 @@ def _composite_backward(residuals, gradient):
                 # The cut and the clamp are flat: no gradient passes there.
                 powers.append(jnp.where((raw >= ALPHA_CUT) & (raw <= ALPHA_MAX), slope * raw, 0.0))
                 weights.append(weight)
+                if strain is not None:
+                    steepness = sum(s * s for s in slopes([c[u][:, None] for c in of_terms], planes))
+                    pulls.append(jnp.sum(jnp.abs(powers[-1]) * jnp.sqrt(steepness), axis=-1))
                 through = through - weight
             weights = jnp.stack(weights)
             sums = [jnp.matmul(weights * g, ones, precision="highest") for g in pull[:-1]]
             (of_rows,) = chain((_moments(jnp.stack(powers), planes), sums))
             place = (number * blocks.turn, index * blocks.block, 0)
-            return through, rest, jax.lax.dynamic_update_slice(of_slots, of_rows, place)
+            of_slots = jax.lax.dynamic_update_slice(of_slots, of_rows, place)
+            if strain is not None:
+                lengths = jax.lax.dynamic_update_slice(lengths, jnp.stack(pulls), place[:2])
+            return through, rest, of_slots, lengths
 
-        start = (blocks.part(before, index), blocks.part(rest, index), of_slots)
-        return jax.lax.fori_loop(0, blocks.turns(index), turn, start)[2]
+        start = (blocks.part(before, index), blocks.part(rest, index), *of_all)
+        return jax.lax.fori_loop(0, blocks.turns(index), turn, start)[2:]
 
     start = jnp.zeros((*chunks.ids.shape, table.shape[1]), table.dtype)
-    of_slots = jax.lax.fori_loop(0, blocks.count, reverse_block, start)
+    start = (start, None if strain is None else start[..., 0])
+    of_slots, lengths = jax.lax.fori_loop(0, blocks.count, reverse_block, start)
+    of_strain = None if strain is None else jnp.zeros_like(strain).at[chunks.ids].add(lengths)
     # Rows are added in the order of the slots, one after the other on a CPU: the same bytes every time. A GPU adds
     # them atomically unless XLA_FLAGS has --xla_gpu_deterministic_ops=true.
-    return jnp.zeros_like(table).at[chunks.ids].add(of_slots), None, None, None
+    return jnp.zeros_like(table).at[chunks.ids].add(of_slots), None, None, None, of_strain
 
 
 composite.defvjp(_composite_forward, _composite_backward)
 
 
-def composite_chunks(splats: Splats, values: jax.Array, chunks: Chunks, camera: Camera, tile: int) -> jax.Array:
-    """Splats with their values (n, v) and chunks -> (tiles, v + 1, tile^2): premultiplied values and, last, alpha."""
-    return composite(splat_table(splats, values), *tile_pixels(camera, tile), chunks)
+def composite_chunks(splats: Splats, values, chunks: Chunks, camera: Camera, tile: int, strain=None) -> jax.Array:
+    """Splats with their values (n, v) and chunks -> (tiles, v + 1, tile^2): premultiplied values and, last, alpha.
+    `strain` (n + 1,) or None is `composite`'s."""
+    return composite(splat_table(splats, values), *tile_pixels(camera, tile), chunks, strain)
 
 
 def median_of_chunks(splats: Splats, chunks: Chunks, camera: Camera, tile: int) -> jax.Array:

@@ -50,6 +50,16 @@ def evaluate(row: list, pixels: list) -> jax.Array:
     return total
 
 
+def slopes(row: list, pixels: list) -> list[jax.Array]:
+    """Derivatives of `evaluate` by each of the k offsets; by the splat's mean they are the same with the other sign."""
+    k = len(pixels)
+    found = list(row[1 : 1 + k])
+    for (i, j), c in zip(second_order(k), row[1 + k :], strict=True):
+        found[i] = found[i] + c * pixels[j]
+        found[j] = found[j] + c * pixels[i]
+    return found
+
+
 def monomials(pixels: list) -> list[jax.Array]:
     """What the coefficients multiply: 1, d_j, d_j d_k."""
     pairs = [pixels[i] * pixels[j] for i, j in second_order(len(pixels))]

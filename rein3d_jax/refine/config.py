@@ -47,6 +47,9 @@ class RefineConfig:
     densify_stop: int = 13_000
     densify_every: int = 100
     densify_gradient: float = 2e-4  # mean 2D gradient, in half image widths, over which a Gaussian is cloned or split
+    # Whether that gradient is a sum of lengths over pixels, in which opposite pulls do not cancel: what is large and
+    # blurred then splits too (AbsGS, Ye et al. 2024, who take 8e-4 for densify_gradient with it).
+    absolute_gradient: bool = False
     densify_share: float = 0.05  # of the buffer, at most, added at a time
     split_size: float = 0.01  # share of the extent over which a Gaussian is split, not cloned
     duplicates: int = 0  # times that pairs of near-duplicates are made one before it begins; see merge_duplicates.py

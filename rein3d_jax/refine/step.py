@@ -28,7 +28,8 @@ def _visible_degrees(gradients, step, config):
 def _loss(parameters, probe, colour, state, view: Views, extent, backdrop, config, raster):
     """Loss of a single view (leading axis 1), and the rasterizer's buffers: needed, overflow."""
     gaussians = join_parameters(parameters, state.alive)
-    frame = rasterize(gaussians, camera_of(view, 0), config=raster, probe=probe)
+    probes = {"strain" if config.absolute_gradient else "probe": probe}
+    frame = rasterize(gaussians, camera_of(view, 0), config=raster, **probes)
     rgb = _tinted(frame, colour[view.source[0]]) if config.colour_rate > 0 else frame.rgb
     image = rgb + (1 - frame.alpha[..., None]) * backdrop
     value = photometric_loss(image, view.rgb[0], view.weight[0], ssim_weight=config.ssim_weight)
@@ -57,11 +58,11 @@ def _gradients(state, views: Views, extent, backdrop, config, raster):
 
     def one_view(total, view):
         view = jax.tree.map(lambda x: x[None], view)
-        probe = jnp.zeros((state.alive.shape[0], 2))
+        probe = jnp.zeros(state.alive.shape if config.absolute_gradient else (state.alive.shape[0], 2))
         gradient = jax.value_and_grad(_loss, argnums=(0, 1, 2), has_aux=True)
         arguments = (state.parameters, probe, state.colour, state, view, extent, backdrop, config, raster)
         (value, buffers), (of_parameters, of_probe, of_colour) = gradient(*arguments)
-        pull = jnp.linalg.norm(of_probe, axis=-1) * size / 2
+        pull = (of_probe if config.absolute_gradient else jnp.linalg.norm(of_probe, axis=-1)) * size / 2
         seen = (pull > 0).astype(jnp.float32)
         return jax.tree.map(jnp.add, total, (of_parameters, of_colour, pull, seen, value)), buffers
 

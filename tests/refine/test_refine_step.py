@@ -1,5 +1,7 @@
 """Laws of one optimisation step."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -30,6 +32,19 @@ def test_a_step_moves_what_is_seen_and_stays_finite(toy, config, raster) -> None
     np.testing.assert_array_equal(moved, np.asarray(new.seen) > 0)
     assert not np.any(moved[~np.asarray(state.alive)]) and moved.any()
     np.testing.assert_array_equal(new.parameters["sh_rest"], state.parameters["sh_rest"])  # degree 1 waits
+
+
+def test_absolute_gradients_are_no_less_and_change_no_parameter(toy, config, raster) -> None:
+    """Pulls of opposite pixels do not cancel; the optimisation itself is the same."""
+    _, views, start = toy()
+    state = initial_state(start, config, sources=3)
+    signed, _ = step(state, views, 2.0, config=config, raster=raster)
+    absolute, _ = step(state, views, 2.0, config=dataclasses.replace(config, absolute_gradient=True), raster=raster)
+    assert np.all(absolute.gradient_sum >= 0.999 * signed.gradient_sum)  # float32 sums
+    seen = np.asarray(signed.seen) > 0
+    assert np.median(absolute.gradient_sum[seen] / signed.gradient_sum[seen]) > 1.2
+    for name, value in signed.parameters.items():  # another program, which may round otherwise
+        np.testing.assert_allclose(absolute.parameters[name], value, atol=1e-5, err_msg=name)
 
 
 def test_a_batch_without_finite_gradient_changes_nothing_and_is_counted(toy, config, raster) -> None:
