@@ -27,7 +27,6 @@ from experiments.pipeline import (
     refine_scene,
     restore_trajectory,
     room_background,
-    scene_extent,
 )
 from experiments.quality import is_novel, render_views
 from experiments.reconstruct import ReconstructConfig
@@ -132,7 +131,7 @@ class Bench:
         started = perf_counter()
         views = collect_views(panorama, [state.video for state in states], stages=config)
         key = jax.random.key(config.seed + 1)
-        scene, _ = refine_scene(states[-1].scene, views, scene_extent(panorama), key, stages=config)
+        scene, _ = refine_scene(states[-1].scene, views, panorama, key, stages=config)
         return jax.block_until_ready(scene), seconds + perf_counter() - started
 
     def row(self, config: ReconstructConfig) -> dict:

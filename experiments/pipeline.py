@@ -11,7 +11,7 @@ from experiments.refine_devices import steps_over
 from rein3d_jax.depth.complete import CompleteConfig
 from rein3d_jax.depth.shell_from_distance import shell_from_distance
 from rein3d_jax.evaluate.coverage import coverage
-from rein3d_jax.explore.hidden import hidden_distance
+from rein3d_jax.explore.hidden import hidden_distance, on_observed
 from rein3d_jax.explore.profile import ExploreConfig
 from rein3d_jax.explore.trajectories import Trajectories
 from rein3d_jax.geometry.poses import equirectangular_camera, rigid
@@ -198,10 +198,13 @@ def _needed(scene: Gaussians, views: Views, stages: Stages) -> Gaussians:
 
 
 def refine_scene(
-    scene: Gaussians, views: Views, extent: float, key: jax.Array, *, stages: Stages, **options
+    scene: Gaussians, views: Views, panorama: Panorama, key: jax.Array, *, stages: Stages, **options
 ) -> tuple[Gaussians, dict]:
     """The refined scene and its curves (paper Sec. 3.3); `options` are `refine`'s."""
     scene = _needed(scene, views, stages)
+    if stages.refine.keep_observed:
+        options["fixed"] = on_observed(panorama, scene.means)
+    extent = scene_extent(panorama)
     if stages.refine.devices != 1:
         options["run"] = steps_over(data_mesh(stages.refine.devices))
     return refine(scene, views, extent, key, config=stages.refine, raster=stages.rasterize, **options)

@@ -35,7 +35,6 @@ from experiments.pipeline import (
     render_video,
     restore_trajectory,
     room_background,
-    scene_extent,
 )
 from experiments.progress import Progress
 from experiments.quality import quality, render_views
@@ -144,7 +143,7 @@ def _stages(config: ReconstructConfig, files: str, store: StageStore, progress: 
     def refine_all():
         chosen = collect_views(panorama, videos, stages=config)
         refine_key = jax.random.fold_in(key, 1)
-        arguments = (last.scene, chosen, scene_extent(panorama), refine_key)
+        arguments = (last.scene, chosen, panorama, refine_key)
         start = store.kept(blank_snapshot(config.refine))
         told = {"on_step": progress.step, "start": start, "on_look": store.keep, "enough": clock.refined}
         return refine_scene(*arguments, stages=config, **told)

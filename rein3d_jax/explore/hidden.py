@@ -14,6 +14,22 @@ STEPS = 24  # places tried along a ray, 6 % apart; even, so that the guess itsel
 MARGIN = 0.02  # relative: what lies this little in front of a surface lies on it
 
 
+def depth(panorama: Panorama, points: jax.Array) -> jax.Array:
+    """(...) of points (..., 3), world: their distance over that of the surface which `panorama` (at the world's origin)
+    shows in their direction. Below 1 is seen to be empty, above 1 hidden."""
+    height, width = panorama.distance.shape
+    u, v = pixels_from_rays(points, height, width)
+    column = jnp.clip(jnp.floor(u).astype(jnp.int32), 0, width - 1)
+    row = jnp.clip(jnp.floor(v).astype(jnp.int32), 0, height - 1)
+    return jnp.linalg.norm(points, axis=-1) / jnp.maximum(panorama.distance[row, column], 1e-6)
+
+
+@jax.jit
+def on_observed(panorama: Panorama, points: jax.Array) -> jax.Array:
+    """(...) bool: whether points (..., 3) lie on the surface that `panorama` shows, or before it."""
+    return depth(panorama, points) <= 1 + MARGIN
+
+
 @jax.jit
 def hidden_distance(panorama: Panorama, origin: jax.Array, rays: jax.Array, guess: jax.Array) -> jax.Array:
     """The hidden place nearest to `guess` (h, w) metres along `rays` (h, w, 3) from `origin` (3,), world frame.
@@ -21,17 +37,11 @@ def hidden_distance(panorama: Panorama, origin: jax.Array, rays: jax.Array, gues
     Hidden at or behind the surface that `panorama` (at the world's origin) shows in that direction. 0 where the ray
     crosses no hidden place within twice the guess: a guess that would stand in seen space is no guess.
     """
-    height, width = panorama.distance.shape
     # From half the guess to twice it, evenly in log distance; the guess itself is one of the places.
     factors = 2.0 ** jnp.linspace(-1.0, 1.0, STEPS + 1)
 
     def cost(factor):
-        points = origin + rays * (guess * factor)[..., None]
-        u, v = pixels_from_rays(points, height, width)
-        column = jnp.clip(jnp.floor(u).astype(jnp.int32), 0, width - 1)
-        row = jnp.clip(jnp.floor(v).astype(jnp.int32), 0, height - 1)
-        seen = panorama.distance[row, column]
-        hidden = jnp.linalg.norm(points, axis=-1) >= seen * (1 - MARGIN)
+        hidden = depth(panorama, origin + rays * (guess * factor)[..., None]) >= 1 - MARGIN
         return jnp.where(hidden, jnp.abs(jnp.log(factor)), jnp.inf)
 
     def nearest(best, factor):

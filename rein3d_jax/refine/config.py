@@ -23,6 +23,9 @@ class RefineConfig:
     # of what was observed is noise that shows from elsewhere (Mip-Splatting's 3D filter, Sec. 5.1). 0 turns it off.
     finest: float = 0.8
     ssim_weight: float = 0.2
+    # Whether Gaussians on the surfaces that the input saw stay as they were lifted, and only guesses are refined:
+    # fitting sharpens them to the input's own sampling, which costs up to 0.3 dB elsewhere (benchmarks/NOTES.md).
+    keep_observed: bool = False
     observed_weight: float = 1.0  # of a pixel that the input saw
     restored_weight: float = 0.5  # of a pixel that was guessed
     distance_weight: float = 0.0  # of |log distance| off the input's, where the input saw

@@ -53,6 +53,7 @@ def refine(
     on_look: Callable[[Snapshot], None] = lambda snapshot: None,
     enough: Callable[[], bool] = lambda: False,
     run: Callable = steps,
+    fixed: jax.Array | None = None,
 ) -> tuple[Gaussians, dict[str, np.ndarray]]:
     """Fit `gaussians` to `views` for `config.steps` steps; every `test_every`-th view is only looked at.
 
@@ -60,8 +61,8 @@ def refine(
     of (step, Gaussians), and the totals `overflow` (Gaussians that densification had no slot for), `reallocated`,
     `skipped`, and `stopped`, the index in STOPPED of why it ended. `extent` is the scene's size in metres. The same
     key gives the same bytes, also when it goes on from the `start` that `on_look` was given. It ends early where
-    `enough()`. `run` takes the steps: `step.steps`, or one that shares them out over devices. Raises InputError where
-    no view is left to train on.
+    `enough()`. `run` takes the steps: `step.steps`, or one that shares them out over devices. `fixed` (n,) bool are the
+    Gaussians that stay as they are. Raises InputError where no view is left to train on.
     """
     total = views.rgb.shape[0]
     held_out = np.arange(0, total, config.test_every)
@@ -70,7 +71,7 @@ def refine(
         raise InputError(f"refine: {total} view leaves none to train on; lower refine.test_every or add trajectories")
     if start is None:
         sources = int(jnp.max(views.source)) + 1
-        state = initial_state(with_sh_degree(gaussians, config.sh_degree), config, sources=sources)
+        state = initial_state(with_sh_degree(gaussians, config.sh_degree), config, sources=sources, fixed=fixed)
         curves = {name: np.zeros((0, 2) if name in CURVES[:3] else ()) for name in CURVES}
         raster = _allocate(state, views, raster)
     else:

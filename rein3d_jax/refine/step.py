@@ -48,6 +48,10 @@ def _tinted(frame, affine):
     return turned + frame.alpha[..., None] * affine[:, 3]
 
 
+def _unless(fixed, update):
+    return jnp.where(fixed.reshape(-1, *[1] * (update.ndim - 1)), 0.0, update)
+
+
 def _mean(values, alive):
     return jnp.sum(jnp.where(alive, values, 0.0)) / jnp.maximum(jnp.sum(alive), 1)
 
@@ -104,6 +108,7 @@ def step(
     updates = updates | {"means": updates["means"] * extent}
     if config.densification == "mcmc":
         updates["means"] += explore(state, extent, jax.random.fold_in(key, state.step), config=config)
+    updates = {name: _unless(state.fixed, update) for name, update in updates.items()}
     parameters = optax.apply_updates(state.parameters, updates)
     parameters["log_scales"] = jnp.maximum(parameters["log_scales"], state.floor[:, None])
     of_colour = of_colour.at[0].set(0.0)  # the input's colours are the scene's

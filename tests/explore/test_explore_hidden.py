@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from rein3d_jax.explore.hidden import MARGIN, STEPS, hidden_distance
+from rein3d_jax.explore.hidden import MARGIN, STEPS, hidden_distance, on_observed
 from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.scene import Panorama
 
@@ -43,6 +43,12 @@ def test_a_hidden_guess_stays_to_the_bit() -> None:
 
 def test_where_nothing_is_hidden_there_is_no_guess() -> None:
     assert not np.any(hidden_distance(seen_at(10.0), ORIGIN, RAYS, jnp.full(SHAPE, 1.5)))
+
+
+def test_what_was_lifted_lies_on_what_was_observed_and_a_guess_behind_does_not() -> None:
+    surface = jax.random.uniform(jax.random.key(2), SHAPE, minval=0.8, maxval=4.0)
+    assert np.all(on_observed(seen_at(surface), RAYS * surface[..., None]))
+    assert not np.any(on_observed(seen_at(surface), RAYS * surface[..., None] * (1 + 2 * MARGIN)))
 
 
 def test_never_in_front_of_what_was_seen() -> None:
