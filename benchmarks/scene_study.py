@@ -37,16 +37,17 @@ from rein3d_jax.io.atomic import write_text
 from rein3d_jax.scene import Gaussians
 
 RECIPE = "experiments/recipes/quick.toml"
-SIZE = ("input.height=128", "restore.height=128", "refine.crop=64", "refine.steps=200", "refine.evaluate_every=200")
+SIZE = ("input.height=128", "restore.height=128", "refine.crop=64", "refine.steps=200", "refine.evaluate_every=200",
+        "lift.share=1.0")
 GROWING = ("refine.densify_start=25", "refine.densify_every=25", "refine.densify_stop=151", "refine.spare=0.2")
-AUTOMATIC = ("explore.least=0.01", "lift.share=0.5", "refine.steps=400", "refine.evaluate_every=100",
+AUTOMATIC = ("explore.least=0.005", "lift.share=0.5", "refine.steps=400", "refine.evaluate_every=100",
              "refine.plateau=0.1", "refine.patience=1")  # fmt: skip
 
 
 def tables() -> dict[str, dict[str, tuple[str, ...]]]:
     """Rows by table: name -> the recipe's keys that it changes. The first row is the one that others are held to."""
     local = ("explore.reach=0.5", "explore.step=0.25")
-    weights = {f"guesses weigh {w}": (f"refine.restored_weight={w}",) for w in (0.5, 1.0, 0.25)}
+    weights = {f"guesses weigh {w}": (f"refine.restored_weight={w}",) for w in (1.0, 0.5, 0.25)}
     grid = itertools.product((0.25, 0.5, 1.0), (2, 4, 8), (0, 400))
     return {
         "exploration": {
@@ -60,6 +61,7 @@ def tables() -> dict[str, dict[str, tuple[str, ...]]]:
         },
         "weights": weights
         | {
+            "what was seen refined too": ("refine.keep_observed=false",),
             "a tint for each path": ("refine.colour_rate=1e-3",),
             "whole panoramas": ("refine.panoramic=true",),
             "distances of the input": ("refine.distance_weight=0.1",),
