@@ -4,7 +4,7 @@ import argparse
 import sys
 
 from benchmarks import poles, rasterize, refine_step, scaling
-from benchmarks.worker import ENGINES
+from benchmarks.engines.worker import ENGINES
 from benchmarks.workloads import SIZES
 from rein3d_jax.errors import InputError
 

@@ -15,7 +15,7 @@ import numpy as np
 from rein3d_jax.conventions import ALPHA_CUT
 from rein3d_jax.geometry.poses import equirectangular_camera, upright
 from rein3d_jax.geometry.sphere import pixel_rays, pixel_solid_angles
-from rein3d_jax.io.atomic import write_bytes, write_text
+from rein3d_jax.io.files.atomic import write_bytes, write_text
 from rein3d_jax.rasterize import RasterizeConfig, allocate, rasterize
 from rein3d_jax.scene import Gaussians
 

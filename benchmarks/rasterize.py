@@ -10,10 +10,10 @@ import json
 import statistics
 from pathlib import Path
 
-from benchmarks.worker import ENGINES, INSTALL, Worker
+from benchmarks.engines.worker import ENGINES, INSTALL, Worker
 from benchmarks.workloads import SIZES
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.atomic import write_text
+from rein3d_jax.io.files.atomic import write_text
 
 ENOUGH = 0.3  # seconds of one engine's turn; short calls repeat
 

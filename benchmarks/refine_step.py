@@ -8,11 +8,11 @@ import json
 import statistics
 from pathlib import Path
 
+from benchmarks.engines.worker import INSTALL, Worker
 from benchmarks.rasterize import turn
-from benchmarks.worker import INSTALL, Worker
 from benchmarks.workloads import SIZES
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.atomic import write_text
+from rein3d_jax.io.files.atomic import write_text
 
 OURS = "rein3d_jax"
 PEERS = ("gsplat-torch-vectorised", "gsplat-torch")

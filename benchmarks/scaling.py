@@ -9,11 +9,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from benchmarks.engine_ours import CONFIG, camera_of, scene_of
+from benchmarks.engines.ours import CONFIG, camera_of, scene_of
 from benchmarks.workloads import Size, make_workload
 from rein3d_jax.geometry.poses import equirectangular_camera, upright
 from rein3d_jax.geometry.sphere import pixel_rays
-from rein3d_jax.io.atomic import write_text
+from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.rasterize import allocate, rasterize
 from rein3d_jax.scene import Gaussians
 

@@ -19,7 +19,7 @@ from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.geometry.shell import meet_shell, world_from_shell
 from rein3d_jax.geometry.sphere import pixel_rays, rays_of_pose
 from rein3d_jax.geometry.spherical_harmonics import C0
-from rein3d_jax.io.atomic import write_text
+from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.rasterize import RasterizeConfig, rasterize, render
 from rein3d_jax.refine import RefineConfig, Views, refine
 from rein3d_jax.refine.views import camera_of

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.atomic import write_text
+from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.restore.learned.condition import FILLS, Clip
 from rein3d_jax.restore.learned.loss import Example
 

@@ -7,9 +7,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from experiments.pairs import Drawn, PairConfig, grown, room_pair, with_buffers
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.pair_shard import PairDataset
+from rein3d_jax.io.pairs.pair_shard import PairDataset
+from rein3d_jax.pipeline.pairs import Drawn, PairConfig, grown, room_pair, with_buffers
 from rein3d_jax.scene import Pair
 
 

@@ -7,7 +7,7 @@ import jax
 
 from experiments.wan_weights import read_wan
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.restorer_weights import SHIPPED, read_restorer
+from rein3d_jax.io.weights.restorer_weights import SHIPPED, read_restorer
 from rein3d_jax.restore.learned.config import NetworkConfig
 from rein3d_jax.restore.learned.network import initial_parameters
 from rein3d_jax.restore.learned.sample import Learned

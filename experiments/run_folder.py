@@ -11,14 +11,14 @@ import jax.numpy as jnp
 import numpy as np
 
 from experiments.config import load_config, recipe_digest
-from experiments.reconstruct import BLANK_SCENE, BLANK_TRAJECTORIES, ReconstructConfig, _blank, _blank_restored
-from experiments.stage_store import PART
+from experiments.reconstruct.__main__ import BLANK_SCENE, BLANK_TRAJECTORIES, ReconstructConfig, _blank, _blank_restored
+from experiments.reconstruct.stage_store import PART
 from rein3d_jax.errors import InputError
 from rein3d_jax.explore.trajectories import Trajectories
-from rein3d_jax.io.checkpoint import load
-from rein3d_jax.io.json_file import read_json
-from rein3d_jax.io.npy import read_arrays, read_headers
-from rein3d_jax.io.ply import read_ply
+from rein3d_jax.io.files.checkpoint import load
+from rein3d_jax.io.files.json_file import read_json
+from rein3d_jax.io.files.npy import read_arrays, read_headers
+from rein3d_jax.io.splats.ply import read_ply
 from rein3d_jax.refine import blank_snapshot
 from rein3d_jax.refine.parameters import join_parameters
 from rein3d_jax.scene import Gaussians, Panorama, Video

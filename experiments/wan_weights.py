@@ -15,11 +15,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.safetensors_folder import load_params, save_params, tensor_names
+from rein3d_jax.io.weights.safetensors_folder import load_params, save_params, tensor_names
 from rein3d_jax.restore.wan.config import WanConfig
-from rein3d_jax.restore.wan.memory import dit_shapes, vae_shapes
 from rein3d_jax.restore.wan.names import Row, dit_rows, layout_of, vae_rows
 from rein3d_jax.restore.wan.restore import WanParams
+from rein3d_jax.restore.wan.training.memory import dit_shapes, vae_shapes
 
 TEXT_LENGTH = 512  # of an embedded prompt: the padding takes part in attention, so it may not be left out
 PROMPTS = ("text", "no_text")

@@ -3,16 +3,16 @@
 import jax
 import jax.numpy as jnp
 
-from rein3d_jax.rooms.catalogue import NONE, SLOTS, texture_groups
 from rein3d_jax.rooms.config import KINDS, RoomConfig
-from rein3d_jax.rooms.footprints import NOWHERE, join
-from rein3d_jax.rooms.furnish import Furniture, Parts, furnish, parts_of
+from rein3d_jax.rooms.furniture.catalogue import NONE, SLOTS, texture_groups
+from rein3d_jax.rooms.furniture.footprints import NOWHERE, join
+from rein3d_jax.rooms.furniture.furnish import Furniture, Parts, furnish, parts_of
+from rein3d_jax.rooms.furniture.template import BOX, CYLINDER, ELLIPSOID, TEXTURES
 from rein3d_jax.rooms.lighting import draw_exposure, draw_lights, draw_outside, reflected
 from rein3d_jax.rooms.materials import GROUP_INDEX, draw_textures
 from rein3d_jax.rooms.model import Room, Solids, Textures
 from rein3d_jax.rooms.openings import OPENINGS, draw_openings
 from rein3d_jax.rooms.plan import STRUCTURE, Plan, draw_plan, draw_walkway, structure_footprints
-from rein3d_jax.rooms.template import BOX, CYLINDER, ELLIPSOID, TEXTURES
 
 _SHELL = 6  # textures and object ids of floor, ceiling and walls
 _FIRST_STRUCTURE = _SHELL + OPENINGS

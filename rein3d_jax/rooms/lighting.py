@@ -4,8 +4,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from rein3d_jax.rooms.catalogue import NAMES
-from rein3d_jax.rooms.furnish import Furniture
+from rein3d_jax.rooms.furniture.catalogue import NAMES
+from rein3d_jax.rooms.furniture.furnish import Furniture
 from rein3d_jax.rooms.materials import linear_from_hsv
 from rein3d_jax.rooms.model import Lights, Openings, Outside, Textures
 from rein3d_jax.rooms.plan import Plan

@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 
-from rein3d_jax.rooms.footprints import NOWHERE, Footprint, join, overlap
+from rein3d_jax.rooms.furniture.footprints import NOWHERE, Footprint, join, overlap
 from rein3d_jax.rooms.model import Openings
 from rein3d_jax.rooms.plan import Plan, structure_footprints
 

@@ -6,7 +6,7 @@ import numpy as np
 from flax import struct
 
 from rein3d_jax.rooms.config import EYE_HEIGHT, KINDS
-from rein3d_jax.rooms.footprints import NOWHERE, Footprint, distance_from_origin, upright_box
+from rein3d_jax.rooms.furniture.footprints import NOWHERE, Footprint, distance_from_origin, upright_box
 
 _SIDES = {  # metres, both sides of the plan
     "living_dining": (4.6, 8.0),

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks import __main__ as command
-from benchmarks import engine_prototype
-from benchmarks.engine_ours import CONFIG, camera_of, scene_of
+from benchmarks.engines import prototype as engine_prototype
+from benchmarks.engines.ours import CONFIG, camera_of, scene_of
 from benchmarks.poles import footprint_errors
 from benchmarks.workloads import ROOM, SIZES, Size, make_workload
 from rein3d_jax.rasterize.reference import rasterize_reference

@@ -14,7 +14,7 @@ from benchmarks import convert_weights
 from benchmarks.array_pickle import load_arrays
 from rein3d_jax.evaluate.clip_features import ALEXNET, I3D
 from rein3d_jax.evaluate.frechet import feature_statistics, frechet_distance
-from rein3d_jax.io import metric_weights
+from rein3d_jax.io.weights import metric_weights
 
 
 def gaussian(seed, d=6):

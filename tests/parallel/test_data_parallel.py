@@ -12,9 +12,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from experiments.guarded_step import batch_gradient
-from experiments.train_config import TrainConfig
-from experiments.train_step import Batch, examples_loss
+from experiments.train_restore.config import TrainConfig
+from experiments.train_restore.guarded_step import batch_gradient
+from experiments.train_restore.step import Batch, examples_loss
 from rein3d_jax.errors import InputError
 from rein3d_jax.parallel import BACKENDS, data_mesh, data_parallel, gather, join_hosts, share_batch
 from rein3d_jax.restore.learned.condition import FILLS, Clip

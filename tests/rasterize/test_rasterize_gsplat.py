@@ -18,7 +18,7 @@ pytest.importorskip("gsplat")
 from gsplat.cuda import _torch_impl as oracle  # noqa: E402
 
 from benchmarks import engine_gsplat  # noqa: E402
-from benchmarks.engine_ours import CONFIG, camera_of, scene_of  # noqa: E402
+from benchmarks.engines.ours import CONFIG, camera_of, scene_of  # noqa: E402
 from benchmarks.workloads import Size, make_workload  # noqa: E402
 
 SIZE = Size(300, 0.1, 96, 72)

@@ -8,7 +8,7 @@ from rein3d_jax.geometry.poses import rigid
 from rein3d_jax.geometry.sphere import world_from_camera_axes
 from rein3d_jax.rooms.config import RoomConfig
 from rein3d_jax.rooms.generate import room
-from rein3d_jax.rooms.trace import trace
+from rein3d_jax.rooms.tracing.trace import trace
 
 ROOMS = 64
 

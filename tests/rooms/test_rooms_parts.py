@@ -5,9 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rein3d_jax.rooms.catalogue import PIECES, size_ranges
-from rein3d_jax.rooms.footprints import Footprint, corners, distance_from_origin, overlap
-from rein3d_jax.rooms.pattern import fractal_noise, joints
+from rein3d_jax.rooms.furniture.catalogue import PIECES, size_ranges
+from rein3d_jax.rooms.furniture.footprints import Footprint, corners, distance_from_origin, overlap
+from rein3d_jax.rooms.tracing.pattern import fractal_noise, joints
 
 
 @pytest.mark.parametrize("footprint", [0.01, 0.2, 0.9])

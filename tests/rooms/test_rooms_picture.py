@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rein3d_jax.rooms.generate import room
-from rein3d_jax.rooms.trace import trace
+from rein3d_jax.rooms.tracing.trace import trace
 
 HEIGHT = 64
 

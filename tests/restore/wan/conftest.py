@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from safetensors.numpy import save_file
 
-from rein3d_jax.io.safetensors_folder import load_params
+from rein3d_jax.io.weights.safetensors_folder import load_params
 from rein3d_jax.restore.wan.config import TINY
-from rein3d_jax.restore.wan.memory import dit_shapes, vae_shapes
 from rein3d_jax.restore.wan.names import dit_rows, vae_rows
+from rein3d_jax.restore.wan.training.memory import dit_shapes, vae_shapes
 
 
 def _golden(name: str) -> dict[str, np.ndarray]:

@@ -13,8 +13,8 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.restore.wan.attention import attend
 from rein3d_jax.restore.wan.config import TINY, DitConfig, preset
 from rein3d_jax.restore.wan.dit import Dit, patchify, unpatchify
-from rein3d_jax.restore.wan.memory import count, dit_shapes
 from rein3d_jax.restore.wan.rotary import rotary_tables, rotate
+from rein3d_jax.restore.wan.training.memory import count, dit_shapes
 
 ROUNDING = 1e-5  # of the largest value: float32 through 6 blocks; sums change their order
 CIRCULAR = replace(TINY.dit, circular=True)

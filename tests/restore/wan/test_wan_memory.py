@@ -9,8 +9,17 @@ import pytest
 from rein3d_jax.errors import InputError
 from rein3d_jax.restore.wan.config import SMALL, TINY, preset
 from rein3d_jax.restore.wan.dit import Dit
-from rein3d_jax.restore.wan.memory import GIB, Workload, count, dit_shapes, forecast, require_fit, tokens, vae_shapes
-from rein3d_jax.restore.wan.trainable import TrainableConfig
+from rein3d_jax.restore.wan.training.memory import (
+    GIB,
+    Workload,
+    count,
+    dit_shapes,
+    forecast,
+    require_fit,
+    tokens,
+    vae_shapes,
+)
+from rein3d_jax.restore.wan.training.trainable import TrainableConfig
 from rein3d_jax.restore.wan.vae import Vae
 
 LARGE = preset("wan2.1-vace-1.3b")

@@ -15,15 +15,15 @@ import numpy as np
 import pytest
 from safetensors.numpy import save_file
 
-from rein3d_jax.io.safetensors_folder import load_params
+from rein3d_jax.io.weights.safetensors_folder import load_params
 from rein3d_jax.restore.wan.condition import control_latents
 from rein3d_jax.restore.wan.config import TINY, VaeConfig, preset
 from rein3d_jax.restore.wan.dit import Dit
-from rein3d_jax.restore.wan.memory import dit_shapes, vae_shapes
 from rein3d_jax.restore.wan.names import dit_rows, vae_rows
 from rein3d_jax.restore.wan.sampler import sample
 from rein3d_jax.restore.wan.schedule import sampling_sigmas
 from rein3d_jax.restore.wan.solver import unipc
+from rein3d_jax.restore.wan.training.memory import dit_shapes, vae_shapes
 from rein3d_jax.restore.wan.vae import MEAN, STD, Vae
 
 pytestmark = pytest.mark.bench

@@ -11,10 +11,10 @@ import pytest
 from rein3d_jax.errors import InputError
 from rein3d_jax.restore.wan.config import TINY, preset
 from rein3d_jax.restore.wan.dit import Dit
-from rein3d_jax.restore.wan.lora import LoraConfig, Pair, merge, start_pairs
-from rein3d_jax.restore.wan.memory import count, dit_shapes
-from rein3d_jax.restore.wan.objective import ObjectiveConfig, Target, flow_loss, latent_weights, target_of
-from rein3d_jax.restore.wan.trainable import PARTS, TrainableConfig, assemble, start_training
+from rein3d_jax.restore.wan.training.lora import LoraConfig, Pair, merge, start_pairs
+from rein3d_jax.restore.wan.training.memory import count, dit_shapes
+from rein3d_jax.restore.wan.training.objective import ObjectiveConfig, Target, flow_loss, latent_weights, target_of
+from rein3d_jax.restore.wan.training.trainable import PARTS, TrainableConfig, assemble, start_training
 
 KEY = jax.random.key(0)
 SHALLOW = replace(TINY.dit, depth=2, control_every=1)  # a main block a step: gradients compile sooner

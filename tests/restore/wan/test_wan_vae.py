@@ -10,7 +10,7 @@ import pytest
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.restore.wan.config import TINY, VaeConfig, preset
-from rein3d_jax.restore.wan.memory import count, vae_shapes
+from rein3d_jax.restore.wan.training.memory import count, vae_shapes
 from rein3d_jax.restore.wan.vae import Norm, Vae
 
 # Norms over 2 channels magnify rounding where both are small; in float64 the difference is 1e-7 (test_wan_parity.py).

@@ -10,10 +10,10 @@ import pytest
 from safetensors.numpy import load_file, save_file
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.safetensors_folder import load_params, save_params, tensor_names
+from rein3d_jax.io.weights.safetensors_folder import load_params, save_params, tensor_names
 from rein3d_jax.restore.wan.config import TINY, preset
-from rein3d_jax.restore.wan.memory import count, dit_shapes, vae_shapes
 from rein3d_jax.restore.wan.names import LAYOUTS, dit_rows, layout_of, vae_rows
+from rein3d_jax.restore.wan.training.memory import count, dit_shapes, vae_shapes
 
 FILE = "diffusion_pytorch_model.safetensors"
 PARTS = {"dit": (dit_rows, dit_shapes(TINY.dit), TINY.dit), "vae": (vae_rows, vae_shapes(TINY.vae), TINY.vae)}

@@ -1,7 +1,0 @@
-"""gsplat's torch reference with tile lists in plain torch instead of its loop in Python."""
-
-from functools import partial
-
-from benchmarks import engine_gsplat
-
-build = partial(engine_gsplat.build, own_lists=False)

@@ -1,0 +1,198 @@
+"""What each choice of the main job buys: a table of variants over rooms, PSNR at novel views, count and seconds.
+
+    python -m benchmarks.studies.scene TABLE [--rooms ../shared/rooms] [--limit N] [--json FILE]
+
+Every row is quick.toml at half its size with some keys changed. Stages that two rows share are made once. Seconds are
+those of a row's stages, the median over rooms: the first ones compile.
+"""
+
+import argparse
+import hashlib
+import itertools
+import json
+from pathlib import Path
+from time import perf_counter
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from experiments.compiled_programs import forget_when_many
+from experiments.config import load_config
+from experiments.evaluate.room import Room, room_folders
+from experiments.reconstruct.__main__ import ReconstructConfig
+from experiments.reconstruct.quality import is_novel, render_views
+from experiments.restorer_network import read_network
+from rein3d_jax.evaluate.metrics import psnr
+from rein3d_jax.explore.trajectories import radial_trajectories
+from rein3d_jax.io.files.atomic import write_text
+from rein3d_jax.pipeline.pipeline import (
+    Restored,
+    collect_views,
+    lift_scene,
+    refine_scene,
+    restore_trajectory,
+    room_background,
+)
+from rein3d_jax.scene import Gaussians
+
+RECIPE = "experiments/recipes/quick.toml"
+SIZE = ("input.height=128", "restore.height=128", "refine.crop=64", "refine.steps=200", "refine.evaluate_every=200",
+        "lift.share=1.0")
+GROWING = ("refine.densify_start=25", "refine.densify_every=25", "refine.densify_stop=151", "refine.spare=0.2")
+AUTOMATIC = ("explore.least=0.005", "lift.share=0.5", "refine.steps=400", "refine.evaluate_every=100",
+             "refine.plateau=0.1", "refine.patience=1")  # fmt: skip
+
+
+def tables() -> dict[str, dict[str, tuple[str, ...]]]:
+    """Rows by table: name -> the recipe's keys that it changes. The first row is the one that others are held to."""
+    local = ("explore.reach=0.5", "explore.step=0.25")
+    weights = {f"guesses weigh {w}": (f"refine.restored_weight={w}",) for w in (1.0, 0.5, 0.25)}
+    grid = itertools.product((0.25, 0.5, 1.0), (2, 4, 8), (0, 400))
+    return {
+        "exploration": {
+            "radial, 8 paths": (),
+            "4 paths": ("explore.trajectories=4",),
+            "2 paths": ("explore.trajectories=2",),
+            "local, 8 paths of 0.5 m": local,
+            "each path alone": ("restore.sequential=false",),
+            "restored at 256 rows": ("restore.height=256",),
+            "no path restored": ("restore.method=none",),
+        },
+        "weights": weights
+        | {
+            "what was seen refined too": ("refine.keep_observed=false",),
+            "a tint for each path": ("refine.colour_rate=1e-3",),
+            "whole panoramas": ("refine.panoramic=true",),
+            "distances of the input": ("refine.distance_weight=0.1",),
+            "harmonics of degree 1": ("refine.sh_degree=1", "refine.sh_degree_every=1"),
+        },
+        "parsimony": {
+            "one a pixel": (),
+            "share 0.5": ("lift.share=0.5",),
+            "share 0.25": ("lift.share=0.25",),
+            "share 0.15": ("lift.share=0.15",),
+            "duplicates merged once": ("refine.duplicates=1",),
+            "duplicates merged three times": ("refine.duplicates=3",),
+            "share 0.5, duplicates merged twice": ("lift.share=0.5", "refine.duplicates=2"),
+        },
+        "steps": {f"{steps} steps": (f"refine.steps={steps}",) for steps in (0, 50, 150, 400, 1000, 2000)},
+        "seeds": {
+            f"{kind}, seed {seed}{again}": (*GROWING, f"refine.densification={kind}", f"seed={seed}")
+            for kind in ("default", "mcmc")
+            for seed, again in ((0, ""), (1, ""), (2, ""), (3, ""), (4, ""), (0, " again"))
+        },
+        "choice": {"automatic": AUTOMATIC}
+        | {
+            f"share {share}, {paths} paths, {steps} steps": (
+                f"lift.share={share}", f"explore.trajectories={paths}", f"refine.steps={steps}",
+            )
+            for share, paths, steps in grid
+        },
+    }  # fmt: skip
+
+
+class Bench:
+    """A room, and what was made of it so far."""
+
+    def __init__(self, folder: Path):
+        self.folder, self.made = folder, {}
+
+    def once(self, key, make):
+        """(result, seconds): made when first asked for."""
+        if key not in self.made:
+            started = perf_counter()
+            result = jax.block_until_ready(make())
+            self.made[key] = (result, perf_counter() - started)
+        return self.made[key]
+
+    def fused(self, config: ReconstructConfig) -> tuple[list[Restored], float]:
+        """The state after each path, and the seconds of all stages so far."""
+        room = Room(self.folder, config)
+        panorama, _ = self.once(config.input.height, lambda: room.panorama)
+        coarse, lifting = self.once(config.lift, lambda: lift_scene(panorama, config.lift))
+        paths, _ = self.once(config.explore, lambda: radial_trajectories(panorama, config=config.explore))
+        background, knowing = self.once("background", lambda: room_background(panorama, config.restore))
+        network = read_network(config.restore)
+        states, seconds = [], lifting + knowing
+        for index in range(config.explore.trajectories):
+
+            def restore_next(index=index, last=states[-1] if states else None):
+                arguments = (coarse, panorama, paths, index, last, jax.random.key(config.seed))
+                return restore_trajectory(*arguments, stages=config, background=background, network=network)
+
+            key = (config.lift, config.explore, config.restore, config.seed, index)
+            state, spent = self.once(key, restore_next)
+            states, seconds = [*states, state], seconds + spent
+        return states, seconds
+
+    def refined(self, config: ReconstructConfig) -> tuple[Gaussians, float]:
+        """The scene of `config`, and its seconds."""
+        states, seconds = self.fused(config)
+        panorama = self.made[config.input.height][0]
+        started = perf_counter()
+        views = collect_views(panorama, [state.video for state in states], stages=config)
+        key = jax.random.key(config.seed + 1)
+        scene, _ = refine_scene(states[-1].scene, views, panorama, key, stages=config)
+        return jax.block_until_ready(scene), seconds + perf_counter() - started
+
+    def row(self, config: ReconstructConfig) -> dict:
+        """PSNR meaned over the novel views, Gaussians, seconds, paths that were restored, and a digest of the scene."""
+        scene, seconds = self.refined(config)
+        room = Room(self.folder, config)
+        views = [view for view in room.traced.views if is_novel(view)]
+        pictures = render_views(scene, views, room.backdrop, config=config.rasterize)
+        found = float(np.mean([psnr(picture, view.rgb) for picture, view in zip(pictures, views, strict=True)]))
+        restored = sum(state.video.rgb.shape[0] > 1 for state in self.fused(config)[0])
+        digest = hashlib.sha256(b"".join(np.asarray(leaf).tobytes() for leaf in jax.tree.leaves(scene))).hexdigest()
+        return {"psnr": found, "count": int(jnp.sum(scene.alive)), "seconds": seconds, "paths": restored,
+                "digest": digest}  # fmt: skip
+
+
+def summary(rows: list[dict], base: list[dict]) -> dict:
+    """[mean, standard error] over rooms of PSNR, of its gain over `base` room by room, and of the count; the median of
+    seconds."""
+    gain = [row["psnr"] - other["psnr"] for row, other in zip(rows, base, strict=True)]
+    values = {"psnr": [row["psnr"] for row in rows], "gain": gain, "count": [row["count"] for row in rows],
+              "paths": [row["paths"] for row in rows]}  # fmt: skip
+    meaned = {name: [round(float(np.mean(v)), 3), round(_error(v), 3)] for name, v in values.items()}
+    return meaned | {"seconds": round(float(np.median([row["seconds"] for row in rows])), 2)}
+
+
+def _error(values: list[float]) -> float:
+    return float(np.std(values, ddof=1)) / len(values) ** 0.5 if len(values) > 1 else 0.0
+
+
+def measure(variants: dict[str, tuple[str, ...]], folders: list[Path]) -> dict[str, list[dict]]:
+    """Row -> a figure for each room, room by room: what rows share is kept no longer than a room."""
+    found = {name: [] for name in variants}
+    for folder in folders:
+        bench = Bench(folder)
+        for name, keys in variants.items():
+            found[name].append(bench.row(load_config(ReconstructConfig, RECIPE, [*SIZE, *keys])))
+            print(folder.name, name, found[name][-1], flush=True)
+            forget_when_many()
+    return found
+
+
+def main() -> None:
+    """Prints a line a row, and writes the table as JSON."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("table", choices=tables())
+    parser.add_argument("--rooms", default="../shared/rooms")
+    parser.add_argument("--limit", type=int, help="rooms at most")
+    parser.add_argument("--json", metavar="FILE")
+    options = parser.parse_args()
+    variants, folders = tables()[options.table], room_folders(options.rooms, options.limit)
+    found = measure(variants, folders)
+    base = next(iter(found.values()))
+    rows = {name: summary(rows, base) | {"each": rows} for name, rows in found.items()}
+    for name, row in rows.items():
+        print(f"{name:36s}", {key: value for key, value in row.items() if key != "each"})
+    if options.json:
+        table = {"recipe": RECIPE, "changed": SIZE, "rooms": [folder.name for folder in folders], "rows": rows}
+        write_text(Path(options.json), json.dumps(table, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

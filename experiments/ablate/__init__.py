@@ -1,0 +1,1 @@
+"""Variants of a training recipe, each with several seeds, side by side."""

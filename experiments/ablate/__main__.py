@@ -1,0 +1,121 @@
+"""Train the learned restorer in several variants, each with several seeds, and compare what they restore.
+
+    python -m experiments.ablate --config experiments/recipes/ablate_restorer.toml --json FILE [--picture PNG]
+        [--set key=value ...]
+
+The recipe is that of experiments.train_restore, and a table more:
+
+    [ablation]
+    seeds = [0, 1, 2]
+    sampler_steps = [1, 4]                     # each run is scored after so many sampler steps
+    [ablation.variants]
+    full = []
+    no_anchor = ["network.anchor=false"]       # what differs, as --set takes it
+
+Runs go into folders of `output`, one a variant and seed; finished ones are not run again.
+"""
+
+import argparse
+import dataclasses
+import json
+import sys
+from pathlib import Path
+from time import perf_counter
+
+import jax
+import numpy as np
+
+from experiments.ablate.chart import ablation_chart
+from experiments.compile_cache import use_compile_cache
+from experiments.config import config_from, read_recipe
+from experiments.example_store import ExampleStore
+from experiments.train_restore.config import TrainConfig
+from experiments.train_restore.evaluate import evaluate, restored
+from experiments.train_restore.learned import train
+from rein3d_jax.errors import InputError
+from rein3d_jax.io.files.atomic import write_text
+from rein3d_jax.io.files.json_file import read_json
+from rein3d_jax.io.weights.restorer_weights import read_restorer
+from rein3d_jax.restore.learned.sample import Learned
+
+TIMED = 5  # clips
+
+
+@dataclasses.dataclass(frozen=True)
+class Ablation:
+    variants: dict[str, list[str]]
+    seeds: tuple[int, ...] = (0, 1, 2)
+    sampler_steps: tuple[int, ...] = (1,)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Exit code 0, or 2 with one line on stderr where the input is at fault."""
+    parser = argparse.ArgumentParser(prog="python -m experiments.ablate", description=__doc__.splitlines()[0])
+    parser.add_argument("--config", required=True, help="a recipe with a table [ablation]")
+    parser.add_argument("--json", required=True, metavar="FILE", help="where to write the figures")
+    parser.add_argument("--picture", metavar="PNG", help="draw gain against seconds, by sampler steps")
+    parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="change one key of the recipe")
+    options = parser.parse_args(arguments)
+    use_compile_cache()
+    try:
+        recipe = read_recipe(options.config)
+        ablation = _ablation(recipe.pop("ablation", None), options.config)
+        jobs = {name: [*options.set, *changes] for name, changes in ablation.variants.items()}
+        configs = {name: config_from(TrainConfig, recipe, changes) for name, changes in jobs.items()}
+        rows = {name: _scores(name, config, ablation) for name, config in configs.items()}
+        write_text(options.json, json.dumps({"config": recipe, "variants": rows}, indent=1) + "\n")
+        if options.picture is not None:
+            ablation_chart(rows, ablation.sampler_steps, Path(options.picture))
+    except InputError as error:
+        print(f"ablate: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _ablation(table, recipe: str) -> Ablation:
+    try:
+        made = Ablation(**(table or {}))
+        return dataclasses.replace(made, seeds=tuple(made.seeds), sampler_steps=tuple(made.sampler_steps))
+    except TypeError as error:
+        raise InputError(f"{recipe}: [ablation] needs a table `variants`, and takes seeds and sampler_steps") from error
+
+
+def _scores(name: str, config: TrainConfig, ablation: Ablation) -> dict:
+    """{metric at N steps: mean over seeds, standard error, each seed's}; hole PSNR in dB, and `gain` over the
+    background fill, `ws_` by area on the sphere; seconds of one clip."""
+    runs = [_run(name, config, seed, ablation) for seed in ablation.seeds]
+    table = {key: [run[key] for run in runs] for key in runs[0]}
+    print(name, {key: f"{np.mean(values):.3f}" for key, values in table.items()}, flush=True)
+    return {key: {"mean": np.mean(values), "sem": _sem(values), "seeds": values} for key, values in table.items()}
+
+
+def _sem(values: list[float]) -> float | None:
+    return float(np.std(values, ddof=1) / np.sqrt(len(values))) if len(values) > 1 else None
+
+
+def _run(name: str, config: TrainConfig, seed: int, ablation: Ablation) -> dict[str, float]:
+    config = dataclasses.replace(config, seed=seed, output=str(Path(config.output) / f"{name}-{seed}"))
+    scores = Path(config.output) / "scores.json"
+    if scores.exists():
+        return read_json(scores)
+    train(config, resume=True)
+    store, (parameters, _) = ExampleStore(config.data.folder), read_restorer(Path(config.output) / "weights.npz")
+    found = {}
+    for steps in ablation.sampler_steps:
+        values, _ = evaluate(store, parameters, config, steps=steps)
+        found |= {f"{key.removeprefix('held_out_')}_{steps}": value for key, value in values.items()}
+        begun, learned = perf_counter(), Learned(parameters, config.network)
+        jax.block_until_ready([restored(learned, store.example(0), steps) for _ in range(TIMED)])
+        found[f"seconds_{steps}"] = (perf_counter() - begun) / TIMED
+    found["parameters"] = sum(np.size(leaf) for leaf in _leaves(parameters))
+    write_text(scores, json.dumps(found))
+    return found
+
+
+def _leaves(tree: dict):
+    for value in tree.values():
+        yield from _leaves(value) if isinstance(value, dict) else [value]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Pairs of clips to train on, as shards."""

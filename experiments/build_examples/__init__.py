@@ -1,0 +1,1 @@
+"""Examples that the small restorer learns from, as files."""

@@ -1,0 +1,1 @@
+"""Methods compared on rooms with ground truth, in the paper's protocols."""

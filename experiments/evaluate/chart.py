@@ -1,0 +1,156 @@
+"""Accuracy against cost for every recipe and method measured on the same rooms: one PNG, and its points as JSON."""
+
+import io
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from experiments.evaluate.pareto import pareto_front
+from rein3d_jax.errors import InputError
+from rein3d_jax.io.files.atomic import write_bytes, write_text
+from rein3d_jax.io.files.json_file import read_json
+
+COLOURS = ("#1f7a8c", "#c8553d", "#6a5acd", "#8a7a2a", "#2d6a4f", "#b5179e", "#555b6e", "#e09f3e")
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Two figures of one protocol against each other."""
+
+    protocol: str
+    cost: str
+    merit: str
+    title: str
+    cost_label: str
+    merit_label: str
+    more_is_better: bool = True
+
+
+SECONDS, GAUSSIANS = "seconds from the panorama, log scale", "Gaussians, thousands"
+PANELS = (
+    Panel("novel_views", "seconds", "psnr", "Novel views", SECONDS, "PSNR, dB"),
+    Panel("novel_views", "gaussians", "psnr", "Novel views", GAUSSIANS, "PSNR, dB"),
+    Panel("novel_views", "seconds", "lpips", "Novel views", SECONDS, "LPIPS, less is better", more_is_better=False),
+    Panel("restoration", "seconds", "psnr_hole", "Restored clips", SECONDS, "PSNR within holes, dB"),
+)
+
+
+@dataclass(frozen=True)
+class Point:
+    """A method under a recipe: means over rooms, and their standard errors (0 where there is only one room)."""
+
+    label: str
+    cost: float
+    cost_sem: float
+    merit: float
+    merit_sem: float
+    rooms: int
+    on_front: bool = False
+
+
+def chart(files: list[Path], picture: Path) -> None:
+    """Draws the result files into `picture`, PNG, and writes what it shows beside it as NAME.chart.json. Raises
+    InputError without matplotlib, for files of different rooms, and for one that is no result of evaluate."""
+    results = {path: _result(path) for path in files}
+    rooms = {tuple(result["rooms"]) for result in results.values()}
+    if len(rooms) > 1:
+        raise InputError(f"--chart: {', '.join(map(str, files))} are of different rooms: evaluate all on the same")
+    panels = [(panel, _points(panel, results)) for panel in PANELS]
+    panels = [(panel, points) for panel, points in panels if points]
+    if not panels:
+        raise InputError(f"--chart: {', '.join(map(str, files))} hold no figures to draw: evaluate novel-views first")
+    drawn = _png(panels, len(next(iter(rooms))))
+    table = [{**asdict(panel), "points": [asdict(point) for point in points]} for panel, points in panels]
+    write_bytes(picture, drawn)
+    write_text(picture.with_suffix(".chart.json"), json.dumps({"rooms": rooms.pop(), "panels": table}, indent=1) + "\n")
+
+
+def _result(path: Path) -> dict:
+    result = read_json(path)
+    if not isinstance(result, dict) or not {"recipe", "rooms"} <= result.keys():
+        raise InputError(f"--chart: {path} is no result of evaluate: give files written by its --json")
+    return result
+
+
+def _points(panel: Panel, results: dict[Path, dict]) -> list[Point]:
+    several = len({result["recipe"] for result in results.values()}) > 1
+    points = {}
+    for result in results.values():
+        for method, metrics in result.get(panel.protocol, {}).items():
+            cost, merit = metrics.get(panel.cost), metrics.get(panel.merit)
+            if cost and merit and cost["mean"] is not None and merit["mean"] is not None:
+                label = f"{method} ({result['recipe']})" if several else method
+                numbers = (cost["mean"], cost["sem"] or 0.0, merit["mean"], merit["sem"] or 0.0)
+                points[label] = Point(label, *numbers, len(merit["rooms"]))
+    sign = 1 if panel.more_is_better else -1
+    listed = list(points.values())
+    front = pareto_front([(point.cost, sign * point.merit) for point in listed])
+    return [Point(**asdict(point) | {"on_front": i in front}) for i, point in enumerate(listed)]
+
+
+def _png(panels: list[tuple[Panel, list[Point]]], rooms: int) -> bytes:
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise InputError('--chart draws with matplotlib: pip install "rein3d-jax[bench]"') from error
+    rows = -(-len(panels) // 2)
+    figure = Figure(figsize=(15, 4.6 * rows), layout="constrained")
+    labels = {point.label: None for _, points in panels for point in points}
+    colours = {label: COLOURS[i % len(COLOURS)] for i, label in enumerate(labels)}
+    axes = figure.subplots(rows, 2, squeeze=False).ravel()
+    for axis, (panel, points) in zip(axes, panels, strict=False):
+        _draw(axis, panel, points, colours)
+    for axis in axes[len(panels) :]:
+        axis.set_axis_off()
+    note = f"Rooms: {rooms}. Points are means over rooms, bars their standard errors. Line and rings: Pareto front."
+    figure.suptitle(note, fontsize=11)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def _draw(axis, panel: Panel, points: list[Point], colours: dict[str, str]) -> None:
+    unit = 1e-3 if panel.cost == "gaussians" else 1.0
+    front = sorted((p for p in points if p.on_front), key=lambda p: p.cost)
+    axis.plot([unit * p.cost for p in front], [p.merit for p in front], color="0.6", lw=1.2, zorder=1)
+    for point in points:
+        place, colour = (unit * point.cost, point.merit), colours[point.label]
+        errors = {"xerr": unit * point.cost_sem, "yerr": point.merit_sem}
+        axis.errorbar(*place, **errors, color=colour, capsize=3, lw=1, zorder=2)
+        edge = {"edgecolor": "black", "linewidth": 1.6} if point.on_front else {"edgecolor": colour}
+        axis.scatter(*place, color=colour, s=60, zorder=3, **edge)
+    axis.set(title=f"{panel.title}: {panel.merit_label}", xlabel=panel.cost_label, ylabel=panel.merit_label)
+    if panel.cost == "seconds":
+        axis.set_xscale("log")
+        for which in (axis.xaxis.set_major_formatter, axis.xaxis.set_minor_formatter):
+            which("{x:g}")
+    axis.margins(x=0.08, y=0.08)
+    axis.tick_params(labelsize=8)
+    axis.grid(alpha=0.25)
+    _label(axis, points, unit, colours)
+
+
+def _label(axis, points: list[Point], unit: float, colours: dict[str, str]) -> None:
+    """Names in a column on the right, in the order of merit, each with a line to its point: none covers another."""
+    low, high = axis.get_ylim()
+    ranked = sorted(points, key=lambda p: p.merit)
+    heights = spread([(p.merit - low) / (high - low) for p in ranked], apart=0.065)
+    for point, height in zip(ranked, heights, strict=True):
+        axis.annotate(
+            f"{point.label}  {point.merit:.3g}",
+            (unit * point.cost, point.merit),
+            xytext=(1.03, height),
+            textcoords="axes fraction",
+            va="center",
+            fontsize=9,
+            color=colours[point.label],
+            arrowprops={"arrowstyle": "-", "color": colours[point.label], "lw": 0.6, "alpha": 0.5},
+        )
+
+
+def spread(heights: list[float], apart: float) -> list[float]:
+    """Ascending heights moved so that neighbours are `apart`, and as a whole no higher than the axes, 1."""
+    placed = []
+    for height in heights:
+        placed.append(max(height, placed[-1] + apart) if placed else height)
+    return [height - max(placed[-1] - 1, 0.0) for height in placed]

@@ -1,1 +1,0 @@
-"""The evaluation's parts: rooms, methods, protocols, figures over rooms, chart. `evaluate.py` joins them."""

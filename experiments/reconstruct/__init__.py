@@ -1,0 +1,1 @@
+"""The main job: one panorama in, one explorable scene out."""

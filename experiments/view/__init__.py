@@ -1,0 +1,1 @@
+"""A run's scene, served on this computer alone."""

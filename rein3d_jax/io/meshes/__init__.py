@@ -1,0 +1,1 @@
+"""Triangle meshes from files (glTF, GLB, OBJ, 3D-FRONT) and to them."""

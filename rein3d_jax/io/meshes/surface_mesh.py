@@ -1,0 +1,82 @@
+"""The surface of a signed distance field as triangles (scikit-image's marching cubes) in a GLB file (trimesh)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rein3d_jax.errors import InputError
+from rein3d_jax.io.files.atomic import write_bytes
+from rein3d_jax.io.pictures.image import to_uint8
+from rein3d_jax.io.pictures.tone import linear_from_srgb
+
+MEND = "pip install 'rein3d-jax[export]'"
+_Y_UP_FROM_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # glTF's, as Blender turns it back
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Triangles whose fronts look into free space, Z up."""
+
+    vertices: np.ndarray  # (v, 3) metres
+    faces: np.ndarray  # (f, 3) int
+    colours: np.ndarray  # (v, 3) sRGB
+
+
+def surface(
+    signed: np.ndarray, known: np.ndarray, rgb: np.ndarray, low: np.ndarray, voxel: float, *, jump: float = np.inf
+) -> Surface:
+    """Where `signed` (x, y, z) metres passes 0 between samples that are all `known` and differ by less than `jump`:
+    a larger one is no surface, but the outline of something before an unseen place. The first sample is at `low` (3,),
+    the others `voxel` metres apart. Raises InputError without scikit-image, or where there is no surface."""
+    try:
+        from skimage.measure import marching_cubes
+    except ImportError as error:
+        raise InputError(f"a mesh needs scikit-image and trimesh: {MEND}") from error
+    signed = np.array(signed)  # scikit-image wants it writable
+    least, most = _of_cells(signed, np.minimum), _of_cells(signed, np.maximum)
+    cells = _of_cells(np.asarray(known), np.logical_and) & (most - least < jump)
+    if not (cells.any() and signed.min() < 0 < signed.max()):
+        raise InputError("the scene has no surface that could become a mesh: render it from nearer, or lower --voxel")
+    # Its mask is asked at the sample where a cell ends.
+    mask = np.pad(cells, ((1, 0),) * 3)
+    vertices, faces, _, _ = marching_cubes(signed, 0.0, mask=mask, gradient_direction="descent")
+    nearest = np.round(vertices).astype(int)
+    return Surface(np.asarray(low) + vertices * voxel, faces, np.asarray(rgb)[tuple(nearest.T)])
+
+
+def without_islands(found: Surface, area: float) -> Surface:
+    """The parts that hang together over `area` square metres or more. Raises InputError without trimesh, or where
+    nothing is left."""
+    trimesh = _trimesh()
+    mesh = trimesh.Trimesh(found.vertices, found.faces, process=False)
+    groups = trimesh.graph.connected_components(mesh.face_adjacency, nodes=np.arange(len(found.faces)))
+    kept = [group for group in groups if mesh.area_faces[group].sum() >= area]
+    if not kept:
+        raise InputError(f"no part of the mesh has {area} square metres: lower --island")
+    faces = found.faces[np.sort(np.concatenate(kept))]
+    used, numbered = np.unique(faces, return_inverse=True)
+    return Surface(found.vertices[used], numbered.reshape(faces.shape), found.colours[used])
+
+
+def write_glb(path: Path, found: Surface) -> None:
+    """Writes the mesh, Y up as glTF wants and with linear colours, atomically. Raises InputError."""
+    mesh = _trimesh().Trimesh(found.vertices @ _Y_UP_FROM_Z_UP.T, found.faces, process=False)
+    opaque = np.full((len(found.colours), 1), 255, np.uint8)
+    mesh.visual.vertex_colors = np.hstack([to_uint8(linear_from_srgb(np.clip(found.colours, 0, 1))), opaque])
+    write_bytes(path, mesh.export(file_type="glb"))
+
+
+def _of_cells(samples: np.ndarray, join: np.ufunc) -> np.ndarray:
+    """(x - 1, y - 1, z - 1): `join` over each cell's eight corners, one axis after another."""
+    for _ in range(3):
+        samples = np.moveaxis(join(samples[:-1], samples[1:]), 0, -1)
+    return samples
+
+
+def _trimesh():
+    try:
+        import trimesh
+    except ImportError as error:
+        raise InputError(f"a mesh needs scikit-image and trimesh: {MEND}") from error
+    return trimesh

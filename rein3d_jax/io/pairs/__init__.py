@@ -1,0 +1,1 @@
+"""Pairs of clips as records in checksummed shards."""

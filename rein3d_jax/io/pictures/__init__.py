@@ -1,0 +1,1 @@
+"""Pictures, distance maps and films."""

@@ -1,0 +1,73 @@
+"""The one door to OpenImageIO's readers: the header first, pixels when it has been judged."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+
+from rein3d_jax.errors import InputError
+from rein3d_jax.io.files.input_file import require_file
+
+MAX_COLUMNS = 16384
+_FORMATS = ("jpeg", "png", "openexr", "hdr")  # OpenImageIO reads many more, a made-up ".null" among them
+_CREDIT = 200  # characters of each
+_MEND = f"give a JPEG, PNG, EXR or HDR file of at most {MAX_COLUMNS} columns"
+
+
+@contextmanager
+def open_image(path: Path) -> Iterator[oiio.ImageInput]:
+    """The opened file, its header read and its pixels not: `.spec()` says sizes, channels and types.
+
+    Raises InputError if it is missing, is no picture, is larger than MAX_COLUMNS, or is cropped or turned.
+    """
+    require_file(path)
+    # A progressive JPEG is decoded whole when it is opened, so the limit must hold inside OpenImageIO.
+    oiio.attribute("limits:resolution", MAX_COLUMNS)
+    as_stored = oiio.ImageSpec()
+    as_stored.attribute("oiio:UnassociatedAlpha", 1)  # colours not multiplied by alpha
+    image = None
+    try:
+        image = oiio.ImageInput.open(str(path), as_stored)
+        if image is None:
+            raise InputError(f"{path} cannot be opened as a picture ({_first_line(oiio.geterror())}): {_MEND}")
+        if image.format_name() not in _FORMATS:
+            raise InputError(f"{path} is a {image.format_name()} file: {_MEND}")
+        _check_whole_and_upright(path, image.spec())
+        yield image
+    except UnicodeDecodeError as error:  # from any text of a damaged header, and errors that quote it
+        raise InputError(f"{path} is damaged (its header is no text): {_MEND}") from error
+    finally:
+        if image is not None:
+            image.close()
+
+
+def read_pixels(path: Path, image: oiio.ImageInput, kind: str) -> np.ndarray:
+    """All pixels (h, w, channels) as `kind` ("float", "uint16"). Raises InputError if the file is damaged."""
+    pixels = image.read_image(kind)
+    error = image.geterror()
+    if pixels is None or error:
+        raise InputError(f"{path} is damaged or cut short ({_first_line(error)}): copy or export it again")
+    return pixels
+
+
+def read_credit(path: Path) -> str:
+    """Who made the picture, and what they allow, as its header has it in one line; "" where it says nothing. Raises
+    InputError as `open_image` does."""
+    with open_image(path) as image:
+        said = (image.spec().get_string_attribute(name) for name in ("Artist", "Copyright"))
+        return "; ".join(" ".join(text.split())[:_CREDIT] for text in said if text.strip())
+
+
+def _check_whole_and_upright(path: Path, spec: oiio.ImageSpec) -> None:
+    window = (spec.x, spec.y, spec.width, spec.height)
+    if window != (spec.full_x, spec.full_y, spec.full_width, spec.full_height):
+        whole = f"{spec.full_width}x{spec.full_height}"
+        raise InputError(f"{path} stores {spec.width}x{spec.height} of a {whole} picture: save it uncropped")
+    if (turn := spec.get_int_attribute("Orientation", 1)) != 1:
+        raise InputError(f"{path} is stored turned (EXIF orientation {turn}): save it upright")
+
+
+def _first_line(error: str) -> str:
+    return " ".join(error.strip().partition("\n")[0].split()) or "no reason given"

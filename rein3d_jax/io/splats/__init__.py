@@ -1,0 +1,1 @@
+"""Gaussian scenes as files: PLY, compressed PLY, SPZ, .splat."""

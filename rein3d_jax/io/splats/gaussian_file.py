@@ -1,0 +1,45 @@
+"""A scene's file, its format by its suffix: .ply (3DGS), .compressed.ply (SuperSplat), .spz, .splat."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from rein3d_jax.errors import InputError
+from rein3d_jax.io.splats.compressed_ply import is_compressed_ply, read_compressed_ply, write_compressed_ply
+from rein3d_jax.io.splats.ply import read_ply, write_ply
+from rein3d_jax.io.splats.splat import read_splat, write_splat
+from rein3d_jax.io.splats.spz import read_spz, write_spz
+from rein3d_jax.scene import Gaussians
+
+
+def _read_any_ply(path: str | Path) -> Gaussians:
+    """Other tools name both kinds .ply."""
+    return read_compressed_ply(path) if is_compressed_ply(path) else read_ply(path)
+
+
+_FORMATS: dict[str, tuple[Callable[..., Gaussians], Callable[..., None]]] = {
+    ".compressed.ply": (_read_any_ply, write_compressed_ply),
+    ".ply": (_read_any_ply, write_ply),
+    ".spz": (read_spz, write_spz),
+    ".splat": (read_splat, write_splat),
+}
+
+
+def read_gaussians(path: str | Path) -> Gaussians:
+    """The scene in `path`, every slot alive, in the axes of io/ply.py. Raises InputError for a suffix that is none of
+    these, and for what the format's reader refuses."""
+    return _format(path)[0](path)
+
+
+def write_gaussians(path: str | Path, gaussians: Gaussians, *, antialias: bool = False) -> None:
+    """Writes the alive slots to `path`, atomically; what a format cannot hold is in its module. `antialias` is
+    write_ply's; .compressed.ply and .splat have no place for it. Raises InputError."""
+    write = _format(path)[1]
+    write(path, gaussians, **({"antialias": antialias} if write in (write_ply, write_spz) else {}))
+
+
+def _format(path: str | Path) -> tuple[Callable[..., Gaussians], Callable[..., None]]:
+    name = Path(path).name.lower()
+    for suffix, format in _FORMATS.items():
+        if name.endswith(suffix):
+            return format
+    raise InputError(f"{path} has no scene format known by its suffix: end it in {', '.join(_FORMATS)}")

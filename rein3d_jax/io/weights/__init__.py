@@ -1,0 +1,1 @@
+"""Networks' weights: NPZ and safetensors, never unpickled."""

@@ -1,0 +1,220 @@
+"""Pairs of clips to learn from (paper Sec. 3): a walk through a place as it is, and as its first panorama, lifted,
+shows it. The place is drawn (`room_pair`: pure, for jit and vmap, so that pairs can be made on the device while
+training) or any other that can be traced (`scene_pair`: meshes)."""
+
+import dataclasses
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+from flax import struct
+
+from rein3d_jax.depth.complete import CompleteConfig, complete_distance
+from rein3d_jax.errors import InputError
+from rein3d_jax.explore.chord import Chord, longest_chord
+from rein3d_jax.explore.profile import ExploreConfig
+from rein3d_jax.geometry.poses import equirectangular_camera, rigid
+from rein3d_jax.geometry.safe import safe_divide
+from rein3d_jax.geometry.sphere import world_from_camera_axes
+from rein3d_jax.lift import LiftConfig, lift
+from rein3d_jax.rasterize import RasterizeConfig, enlarge, rasterize
+from rein3d_jax.rooms.config import RoomConfig
+from rein3d_jax.rooms.generate import room
+from rein3d_jax.rooms.tracing.trace import trace
+from rein3d_jax.scene import Pair, Panorama, Video
+
+SCOUT = 64  # rows of the panorama by which a room's path is found
+ATTEMPTS = 200  # rooms drawn for one that has the path
+
+Look = Callable[[jax.Array, int], tuple]  # pose (4, 4), rows -> rgb (h, w, 3), distance (h, w), 0 where nothing is hit
+
+
+@dataclasses.dataclass(frozen=True)
+class PairConfig:
+    """What a clip is."""
+
+    height: int = 128  # rows of its frames
+    source_height: int = 0  # rows of the first panorama as it is lifted; 0 = height
+    frames: int = 17  # the paper's clips have 41
+    speed: float = 1.0  # metres a second
+    rate: float = 10.0  # frames a second
+    samples: int = 1  # rays a pixel and side of a room's frames
+    explore: ExploreConfig = ExploreConfig()  # how much clearance a path keeps
+    lift: LiftConfig = LiftConfig()
+    depth: CompleteConfig = CompleteConfig()  # where what shows through windows is placed, as in the main job
+    rasterize: RasterizeConfig = RasterizeConfig()
+    rooms: RoomConfig = RoomConfig()
+
+    def __post_init__(self):
+        if self.height % self.rasterize.tile or self.height < 8:
+            raise InputError(f"height {self.height} must be a multiple of rasterize.tile {self.rasterize.tile}")
+        if self.source_rows % 2 or self.source_rows < 8:
+            raise InputError(f"source_height {self.source_height} must be even and at least 8, or 0")
+        if self.frames < 2 or self.samples < 1:
+            raise InputError("frames must be at least 2 and samples at least 1: a clip is a walk")
+        if not (self.speed > 0 and self.rate > 0):
+            raise InputError("speed and rate must be above 0: a path of no length shows nothing new")
+
+    @property
+    def length(self) -> float:
+        """Metres walked."""
+        return (self.frames - 1) * self.speed / self.rate
+
+    @property
+    def source_rows(self) -> int:
+        """Rows of the panorama that is lifted."""
+        return self.source_height or self.height
+
+
+@struct.dataclass
+class Drawn:
+    """A pair, and how it came about."""
+
+    pair: Pair
+    length: jax.Array  # () metres of the longest path; where it is shorter than the config's, the pair is none
+    draws: jax.Array  # () rooms drawn until one had the path
+    needed: jax.Array  # (4,) the rasterizer's buffers that the degraded clip called for
+
+
+def room_pair(key: jax.Array, config: PairConfig) -> Drawn:
+    """The pair of a key: a room with a path of the config's length, drawn again until there is one.
+
+    Pure; for jit (config static) and vmap over keys. The caller checks `length >= config.length`, and that `needed`
+    fits config.rasterize.buffers (`with_buffers` sets them); else frames miss splats.
+    """
+    draw_key, walk_key = jax.random.split(key)
+
+    def draw(state):
+        """The next room, and its longest path."""
+        draws, _, _ = state
+        place = room(jax.random.fold_in(draw_key, draws), config.rooms)
+        distance = trace(place, _pose(jnp.zeros(3)), SCOUT).distance
+        return draws + 1, place, longest_chord(distance, distance > 0, config=config.explore)
+
+    def too_short(state):
+        draws, _, path = state
+        return (path.length < config.length) & (draws < ATTEMPTS)
+
+    blank = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), jax.eval_shape(draw, (jnp.int32(0), None, None)))
+    draws, place, path = jax.lax.while_loop(too_short, draw, blank)
+    offsets, start = walk(walk_key, path, config)
+    clean = trace(place, _pose(start + offsets), config.height, samples=config.samples)
+    source = clean.rgb[0], clean.distance[0]
+    if (config.source_rows, config.samples) != (config.height, 1):
+        apart = trace(place, _pose(start), config.source_rows)
+        source = apart.rgb, apart.distance
+    degraded, needed = _degraded(Panorama(*source, source[1] > 0), _pose(offsets), config)
+    return Drawn(Pair(_clean(clean.rgb, clean.distance, offsets), degraded), path.length, draws, needed)
+
+
+def make_pair(key: jax.Array, config: PairConfig) -> Drawn:
+    """`room_pair` with buffers that fit. Raises InputError where no room of ATTEMPTS has the path."""
+    config = with_buffers(config)
+    while True:
+        drawn = _room_pair(key, config)
+        if float(drawn.length) < config.length:
+            raise InputError(
+                f"none of {ATTEMPTS} rooms has a straight path of {config.length:g} m (frames, speed, rate) that keeps "
+                f"{config.explore.clearance:g} m clearance (explore); the longest of the last is {drawn.length:.2f} m"
+            )
+        if (more := grown(config, drawn.needed)) is None:
+            return drawn
+        config = more
+
+
+def scene_pair(key: jax.Array, look: Look, config: PairConfig) -> Drawn:
+    """The pair of any place that `look` can trace, from where its origin stands.
+
+    Raises InputError where its longest path is shorter than the config's, a path of no length included."""
+    _, walk_key = jax.random.split(key)
+    distance = jnp.asarray(look(_pose(jnp.zeros(3)), SCOUT)[1])
+    chord = longest_chord(distance, distance > 0, config=config.explore)
+    if float(chord.length) < config.length:
+        raise InputError(
+            f"the longest straight path through its origin has {chord.length:.2f} m, and a clip walks "
+            f"{config.length:g} m: lower frames or speed or explore's clearance, or leave the scene out"
+        )
+    offsets, start = walk(walk_key, chord, config)
+    source = Panorama(*_seen(look, start, config.source_rows))
+    frames = [_seen(look, start + offset, config.height) for offset in offsets]
+    rgb, distance, _ = (jnp.stack(part) for part in zip(*frames, strict=True))
+    degraded, needed = _fitting(source, _pose(offsets), config)
+    return Drawn(Pair(_clean(rgb, distance, offsets), degraded), chord.length, jnp.int32(1), needed)
+
+
+def degrade(panorama: Panorama, world_from_camera: jax.Array, *, config: PairConfig = PairConfig()) -> Video:
+    """What a panorama (h, 2 h) at the world's origin, lifted, shows at poses (t, 4, 4), in config.height rows."""
+    config = dataclasses.replace(config, source_height=panorama.valid.shape[0])
+    return _fitting(panorama, world_from_camera, config)[0]
+
+
+def walk(key: jax.Array, path: Chord, config: PairConfig) -> tuple[jax.Array, jax.Array]:
+    """Places (t, 3) relative to the first, and the first (3,): a piece of the path drawn by `key`, either way along."""
+    where, way = jax.random.split(key)
+    begin = jax.random.uniform(where) * jnp.maximum(path.length - config.length, 0.0)
+    back = jax.random.bernoulli(way)
+    begin = jnp.where(back, path.length - begin, begin)
+    steps = jnp.arange(config.frames) * (config.speed / config.rate) * jnp.where(back, -1.0, 1.0)
+    return steps[:, None] * path.direction, path.start + begin * path.direction
+
+
+def _degraded(panorama: Panorama, poses: jax.Array, config: PairConfig) -> tuple[Video, jax.Array]:
+    """The video, and the buffers (4,) that it called for: it is whole where the config's are as large."""
+    distance = complete_distance(panorama.distance, panorama.valid, config=config.depth)
+    everywhere = jnp.ones(panorama.valid.shape, bool)
+    placed = Panorama(panorama.rgb, distance, everywhere)  # what has no distance has a colour
+    scene = lift(placed, _pose(jnp.zeros(3)), everywhere, config=config.lift)
+
+    def look(pose):
+        frame = rasterize(scene, equirectangular_camera(pose, config.height), config=config.rasterize)
+        rgb = safe_divide(frame.rgb, frame.alpha[..., None])
+        return jnp.clip(rgb, 0, 1), frame.alpha, frame.distance, frame.needed
+
+    rgb, alpha, distance, needed = jax.lax.map(look, poses)
+    return Video(rgb, alpha, distance, poses), needed.max(axis=0)
+
+
+def _fitting(panorama: Panorama, poses: jax.Array, config: PairConfig) -> tuple[Video, jax.Array]:
+    config = with_buffers(config)
+    while True:
+        video, needed = _degraded_compiled(panorama, poses, config)
+        if (more := grown(config, needed)) is None:
+            return video, needed
+        config = more
+
+
+def _seen(look: Look, position: jax.Array, rows: int) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Colour, distance, and where the distance is known."""
+    rgb, distance = (jnp.asarray(x) for x in look(_pose(position), rows))
+    return rgb, distance, distance > 0
+
+
+def _clean(rgb: jax.Array, distance: jax.Array, offsets: jax.Array) -> Video:
+    return Video(rgb, jnp.ones(distance.shape), distance, _pose(offsets))
+
+
+def _pose(position: jax.Array) -> jax.Array:
+    """(..., 4, 4) of a panorama at (..., 3) that looks along +X."""
+    return rigid(jnp.broadcast_to(world_from_camera_axes(), (*position.shape[:-1], 3, 3)), position)
+
+
+def with_buffers(config: PairConfig) -> PairConfig:
+    """The config with rasterizer buffers that most clips fit: a function of the config alone, since sums over buffers
+    of other sizes round otherwise, and a clip's bytes may not depend on those before it."""
+    splats = 2 * (config.source_rows // config.lift.stride) ** 2
+    tiles = 2 * (config.height // config.rasterize.tile) ** 2
+    pairs = 3 * splats + 90 * tiles  # measured at 128 and 256 source rows: 2.7 splats + 82 tiles
+    sizes = (splats, 3 * splats // 2 + 20 * tiles, pairs, pairs // config.rasterize.chunk + tiles)
+    return dataclasses.replace(config, rasterize=enlarge(config.rasterize, *sizes))
+
+
+def grown(config: PairConfig, needed: jax.Array) -> PairConfig | None:
+    """The config with buffers for `needed` (4,); None where it has them already."""
+    sizes = [int(x) for x in needed]
+    if all(size <= has for size, has in zip(sizes, config.rasterize.buffers, strict=True)):
+        return None
+    return dataclasses.replace(config, rasterize=enlarge(config.rasterize, *sizes))
+
+
+_room_pair = jax.jit(room_pair, static_argnames="config")
+_degraded_compiled = jax.jit(_degraded, static_argnames="config")

@@ -1,0 +1,1 @@
+"""Furniture: its catalogue, its parts, and where it fits into a plan."""

@@ -1,0 +1,96 @@
+"""The furniture there is, by name, and the tables that a room is furnished from."""
+
+import numpy as np
+
+from rein3d_jax.rooms.config import KINDS
+from rein3d_jax.rooms.furniture.hung import PIECES as HUNG
+from rein3d_jax.rooms.furniture.seats import PIECES as SEATS
+from rein3d_jax.rooms.furniture.storage import PIECES as STORAGE
+from rein3d_jax.rooms.furniture.template import PARTS, TEXTURES
+from rein3d_jax.rooms.furniture.wet import PIECES as WET
+from rein3d_jax.rooms.materials import GROUP_INDEX
+
+PIECES = SEATS | STORAGE | WET | HUNG
+NAMES = tuple(PIECES)
+NONE = len(NAMES)  # the index that stands for no piece
+
+_PICTURES = ({"picture": 3, "wall_shelf": 1, "mirror": 0.5}, {"picture": 3, "wall_shelf": 1, "none": 1.5})
+_LAMP = {"pendant": 3, "ceiling_disc": 3, "spots": 1.5}
+_GREEN = {"plant": 3, "tall_plant": 1.5, "none": 1.5}
+# What each kind of room holds: one piece for each row, drawn by weight, placed in this order: large things first.
+PROGRAMS = {
+    "living_dining": (
+        _LAMP, {"dining": 4, "round_dining": 2}, {"sofa": 4, "corner_sofa": 2}, {"tv_unit": 4, "cabinet": 1},
+        {"shelf": 3, "cabinet": 2, "wardrobe": 1, "open_shelf": 2}, {"coffee_table": 4, "round_table": 2, "pouf": 1},
+        {"armchair": 3, "chair": 1, "none": 1}, {"cabinet": 2, "side_table": 2, "desk": 1, "none": 1}, _GREEN,
+        {"floor_lamp": 3, "none": 1}, {"rug": 3, "none": 2}, *_PICTURES, {"curtain": 1, "radiator": 1, "none": 2},
+    ),
+    "living": (
+        _LAMP, {"sofa": 3, "corner_sofa": 2}, {"tv_unit": 4, "cabinet": 1}, {"sofa": 2, "armchair": 2, "none": 1},
+        {"shelf": 3, "open_shelf": 2, "cabinet": 2}, {"coffee_table": 4, "round_table": 2, "pouf": 1},
+        {"armchair": 3, "chair": 1, "none": 1}, {"desk": 1.5, "side_table": 2, "wardrobe": 1, "none": 1}, _GREEN,
+        {"floor_lamp": 4, "none": 1}, {"rug": 3, "none": 1}, *_PICTURES, {"tall_plant": 1, "radiator": 1, "none": 1},
+    ),
+    "bedroom": (
+        _LAMP, {"bed": 5, "single_bed": 2}, {"wardrobe": 5, "cabinet": 1}, {"desk": 2, "cabinet": 3, "none": 0.5},
+        {"nightstand": 3, "side_table": 1}, {"nightstand": 2, "none": 1}, {"shelf": 2, "open_shelf": 1.5, "none": 1},
+        {"armchair": 1.5, "chair": 2, "pouf": 1, "none": 1}, _GREEN, {"floor_lamp": 2, "none": 2},
+        {"rug": 3, "none": 2}, *_PICTURES, {"radiator": 1, "none": 2},
+    ),
+    "kitchen": (
+        _LAMP, {"counter": 1}, {"fridge": 4, "none": 1}, {"counter": 2, "short_counter": 3}, {"wall_cabinets": 1},
+        {"dining": 2, "round_dining": 2, "island": 2, "none": 0.5}, {"cabinet": 2, "open_shelf": 2, "none": 1},
+        {"chair": 1, "none": 1}, {"wall_cabinets": 1, "wall_shelf": 1, "none": 1}, _GREEN, {"none": 1}, *_PICTURES,
+        {"radiator": 1, "none": 2},
+    ),
+    "bathroom": (
+        _LAMP, {"bathtub": 3, "shower": 2}, {"vanity": 1}, {"toilet": 6, "none": 1}, {"mirror": 4, "none": 1},
+        {"cabinet": 2, "open_shelf": 1, "none": 1}, {"washer": 2, "none": 2}, {"pouf": 0.5, "none": 1},
+        {"plant": 1, "none": 2}, {"none": 1}, {"rug": 1, "none": 2}, {"picture": 1, "none": 2},
+        {"radiator": 2, "none": 1}, {"wall_shelf": 1, "none": 1},
+    ),
+}  # fmt: skip
+SLOTS = 14
+PLACES = ("wall", "free", "hung", "flat", "ceiling")
+
+
+def program_weights() -> np.ndarray:
+    """(kinds, SLOTS, pieces + 1): the last column is no piece."""
+    table = np.zeros((len(KINDS), SLOTS, NONE + 1), np.float32)
+    for kind, name in enumerate(KINDS):
+        for slot, weights in enumerate(PROGRAMS[name]):
+            for piece, weight in weights.items():
+                table[kind, slot, NONE if piece == "none" else NAMES.index(piece)] = weight
+    return table
+
+
+def size_ranges() -> np.ndarray:
+    """(pieces + 1, 4, 2): width, depth, height, lift in metres; no piece has no size."""
+    rows = [(p.width, p.depth, p.height, p.lift) for p in PIECES.values()]
+    return np.array([*rows, np.zeros((4, 2))], np.float32)
+
+
+def places() -> np.ndarray:
+    """(pieces + 1,) index into PLACES."""
+    return np.array([*(PLACES.index(p.place) for p in PIECES.values()), 0])
+
+
+def texture_groups() -> np.ndarray:
+    """(pieces + 1, TEXTURES) index into materials.GROUPS; the last one fills up."""
+    rows = [[GROUP_INDEX[name] for name in p.textures] for p in PIECES.values()]
+    assert max(map(len, rows)) <= TEXTURES
+    return np.array([*(row + row[-1:] * (TEXTURES - len(row)) for row in rows), [0] * TEXTURES])
+
+
+def part_tables() -> dict[str, np.ndarray]:
+    """For (pieces + 1, PARTS): bounds (.., 3, 2, 4) in W, D, H, M; shape; texture; casts; chance, 0 for no part."""
+    count = (NONE + 1, PARTS)
+    bounds, shape, texture = np.zeros((*count, 3, 2, 4), np.float32), np.zeros(count, int), np.zeros(count, int)
+    chance, casts = np.zeros(count, np.float32), np.zeros(count, bool)
+    for i, (name, piece) in enumerate(PIECES.items()):
+        assert len(piece.parts) <= PARTS, f"{name} has {len(piece.parts)} parts, {PARTS} are the most"
+        for j, part in enumerate(piece.parts):
+            bounds[i, j] = part.x, part.y, part.z
+            shape[i, j], texture[i, j], chance[i, j] = part.shape, part.texture, part.chance
+            casts[i, j] = part.casts
+    return {"bounds": bounds, "shape": shape, "texture": texture, "casts": casts, "chance": chance}

@@ -1,0 +1,1 @@
+"""A room as a picture: exact intersections, light, materials under a pixel's footprint."""

@@ -1,0 +1,124 @@
+"""What the report of a run says: sliders, warnings in plain words, where it stands, whose pictures; all of it text."""
+
+import dataclasses
+import json
+import re
+from pathlib import Path
+
+import cv2
+import html5lib
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+
+from experiments.reconstruct import story
+from experiments.reconstruct.inputs import FITTED, GIVEN, SAMPLES, InputConfig
+from experiments.reconstruct.sources import sources
+from experiments.run_folder import open_run
+from rein3d_jax.geometry.poses import pinhole_camera, upright
+from rein3d_jax.io.rooms.traced_room import View
+from rein3d_jax.report.report import Comparison, render_report
+
+HOSTILE = "<script>alert(1)</script> \"quoted\" & 'single'"
+FILE = "<img src=x onerror=alert(1)> & 'quoted'.png"  # no slash, which a file's name cannot have
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture(scope="module")
+def run(run_folder):
+    """A run with one novel view, whose names a hostile file could have."""
+    found = open_run(run_folder)
+    videos = list(found.videos())
+    ends = [np.asarray(videos[index].rgb[-1]) for index in story.longest(found.trajectories)]
+    picture = np.full((32, 32, 3), 0.5, np.float32)
+    view = View(HOSTILE, picture, pinhole_camera(upright(np.array([0.5, 0, 0])), 32, 1.5))
+    metrics = {
+        "seconds": {"read": 1.0, "lift": 2.0, "refine": 30.0, "write": 9.0, "total": 42.0},
+        "count": {"pixels": 8192, "lift": 8192, "refined": 9000},
+        "overflows": {"explore.max_frames": 0, "lift.capacity": 0, "refine.spare": 0},
+        "skipped_steps": 0,
+        "coverage": {"coarse": 0.95, "refined": 1.0},
+        "quality": {name: {"psnr": 20.0, "ssim": 0.7, "views": 1} for name in ("coarse", "refined")},
+    }
+    curves = {name: np.zeros((0, 2)) for name in ("loss", "psnr", "count")}
+    config = InputConfig(panorama=f"somewhere/{FILE}", distance=None, views=None)
+    return story.Run(config, found.config.explore, found.panorama, GIVEN, found.trajectories, videos, ends, ends,
+                     [view], [picture], [picture], curves, metrics)  # fmt: skip
+
+
+def with_metrics(run, **changes):
+    return dataclasses.replace(run, metrics={**run.metrics, **changes})
+
+
+def test_every_shown_path_and_view_has_a_slider(run):
+    parts = [part for part in story.tell(run).parts if isinstance(part, Comparison)]
+    assert len(parts) == len(story.longest(run.trajectories)) + 1
+    for part in parts:  # a divider needs two pictures of a size
+        sizes = {cv2.imdecode(np.frombuffer(p.data, np.uint8), 1).shape for p in (part.before, part.after)}
+        assert len(sizes) == 1
+
+
+def test_the_page_is_valid_and_names_are_text(run):
+    page = render_report(story.tell(run))
+    html5lib.HTMLParser(strict=True).parse(page)
+    assert "<script" not in page and "<img src=x" not in page
+    assert "&lt;script&gt;" in page and "&lt;img src=x" in page  # the view's name, and the picture's
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"coverage": {"coarse": 0.6, "refined": 1.0}}, "40% .* was hidden from the panorama and is a guess"),
+        ({"coverage": {"coarse": 0.8, "refined": 0.9}}, "10% .* is empty"),
+        ({"overflows": {"lift.capacity": 1234}}, "capacity was reached: 1,234 Gaussians .* raise lift.capacity"),
+        ({"overflows": {"explore.max_frames": 3}}, "3 frames .* raise explore.max_frames"),
+        ({"skipped_steps": 2}, "2 refinement steps"),
+    ],
+)
+def test_warnings_in_plain_words(run, changes, words):
+    assert not story.tell(run).warnings
+    (warning,) = story.tell(with_metrics(run, **changes)).warnings
+    assert re.search(words, warning)
+
+
+def test_a_guessed_scale_is_told(run):
+    report = story.tell(dataclasses.replace(run, origin_of_distance=FITTED))
+    assert any("scale is a guess" in warning and "shell.camera_height" in warning for warning in report.warnings)
+    assert "room-shell estimate" in report.distance_origin
+
+
+def test_a_run_stands_among_what_was_measured(run):
+    (own,) = [mark for mark in story.tell(run).standing.marks if mark.own]
+    assert (own.cost, own.merit) == (33.0, 20.0)  # from the panorama to the scene, nothing of what is written after
+    blind = with_metrics(run)
+    del blind.metrics["quality"]
+    (own,) = [mark for mark in story.tell(blind).standing.marks if mark.own]
+    assert own.merit is None and "no truth" in own.label
+
+
+def test_the_chart_is_the_committed_one():
+    """After a new one: cp benchmarks/results/evaluate.chart.json experiments/reconstruct/measured.json"""
+    shipped, committed = ROOT / "experiments/reconstruct/measured.json", ROOT / "benchmarks/results/evaluate.chart.json"
+    assert json.loads(shipped.read_text()) == json.loads(committed.read_text())
+
+
+def test_licences_of_samples_are_those_of_their_list():
+    listed = (SAMPLES / "SOURCES.md").read_text()
+    said = " ".join(sources("sample:room/input.png"))
+    for name in ("Scopia", "BlendSwap-CC-BY", "KatorLegaz", "BlendSwap-CC-0", "CC-BY 3.0", "CC-BY 3.0 US", "CC0"):
+        assert name in said and name in listed
+    assert "CC0" in sources("sample:hotel_room.jpg")[0]
+    samples = {path.name for path in SAMPLES.iterdir() if path.suffix != ".md"}
+    assert all(len(sources(f"sample:{name}")) == 2 for name in samples)
+
+
+def test_the_credit_of_ones_own_picture_is_shown(tmp_path):
+    spec = oiio.ImageSpec(32, 16, 3, "uint8")
+    spec.attribute("Copyright", f"(c) {HOSTILE}\n" + "x" * 999)
+    spec.attribute("Artist", "Somebody")
+    out = oiio.ImageOutput.create(str(tmp_path / "a.jpg"))
+    assert out.open(str(tmp_path / "a.jpg"), spec) and out.write_image(np.zeros((16, 32, 3), np.uint8)) and out.close()
+    (said,) = sources(str(tmp_path / "a.jpg"))
+    assert "a.jpg. The file says: Somebody; (c) <script>" in said and "\n" not in said and len(said) < 600
+    cv2.imwrite(str(tmp_path / "b.png"), np.zeros((16, 32, 3), np.uint8))
+    assert "names no author and no licence" in sources(str(tmp_path / "b.png"))[0]

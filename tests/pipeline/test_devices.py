@@ -1,0 +1,77 @@
+"""Refinement over four devices takes the step that one takes."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rein3d_jax.errors import InputError
+from rein3d_jax.parallel import data_mesh
+from rein3d_jax.pipeline.devices import steps_over
+
+ROOT = Path(__file__).parents[2]
+DEVICES = 4
+
+
+def test_four_devices_take_the_step_of_one():
+    """In a process of its own: a process has the devices that it begins with."""
+    flags = f"{os.environ.get('XLA_FLAGS', '')} --xla_force_host_platform_device_count={DEVICES}"
+    environment = {**os.environ, "XLA_FLAGS": flags, "JAX_PLATFORMS": "cpu", "PYTHONPATH": "."}
+    command = [sys.executable, __file__]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr[-2000:]
+
+
+def test_a_batch_that_cannot_be_shared_is_refused():
+    class Three:
+        size = 3
+
+    class Config:
+        batch = 4
+
+    with pytest.raises(InputError, match=r"refine.batch 4 is not divided by 3 devices"):
+        steps_over(Three())(None, None, [], [], 1.0, None, config=Config(), raster=None)
+    assert data_mesh(1).size == 1
+
+
+def on_four_devices():
+    """Raises AssertionError where losses or gradients' sums differ, or an overflow goes unseen."""
+    import dataclasses
+
+    import jax
+    import numpy as np
+
+    from rein3d_jax.refine.state import initial_state
+    from rein3d_jax.refine.step import steps
+
+    spec = importlib.util.spec_from_file_location("toy", ROOT / "tests" / "refine" / "conftest.py")
+    toy = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(toy)
+    assert jax.device_count() == DEVICES
+    config = dataclasses.replace(toy.CONFIG, batch=DEVICES, colour_rate=1e-3)
+    views, start = toy.make_views(), toy.blurred(toy.make_scene())
+    batches, backdrops = np.array([[1, 2, 3, 5]]), jax.numpy.array([[0.2, 0.6, 0.9]])
+    arguments = (views, batches, backdrops, 2.0, jax.random.key(0))
+    found = []
+    for run in (steps, steps_over(data_mesh())):
+        state = initial_state(start, config, sources=3)
+        found.append(run(state, *arguments, config=config, raster=toy.RASTER))
+    (alone, of_one), (shared, of_four) = found
+    np.testing.assert_allclose(of_four["loss"], of_one["loss"], rtol=1e-5)  # float32 sums in another order
+    np.testing.assert_allclose(shared.gradient_sum, alone.gradient_sum, rtol=1e-3, atol=1e-6)  # likewise, of 256 pixels
+    np.testing.assert_array_equal(shared.seen, alone.seen)
+    for name in alone.parameters:  # Adam's first moment after one step is a tenth of the gradient
+        one, four = (np.asarray(s.optimizer.inner_states[name].inner_state[0].mu[name]) for s in (alone, shared))
+        np.testing.assert_allclose(four, one, atol=1e-4 * np.abs(one).max(initial=0), err_msg=name)  # float32 sums
+    tight = dataclasses.replace(toy.RASTER, pair_capacity=16)
+    _, cut = steps_over(data_mesh())(initial_state(start, config, sources=3), *arguments, config=config, raster=tight)
+    _, whole = steps(initial_state(start, config, sources=3), *arguments, config=config, raster=tight)
+    assert int(cut["overflow"][0]) == int(whole["overflow"][0]) > 0
+    assert np.all(np.asarray(cut["needed"][0])[2] >= np.asarray(whole["needed"][0])[2])  # no less than any needs
+
+
+if __name__ == "__main__":
+    on_four_devices()
