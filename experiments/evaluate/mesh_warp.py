@@ -10,7 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from experiments.evaluate.look import Shown
 from rein3d_jax.conventions import EQUIRECTANGULAR
-from rein3d_jax.geometry.pinhole import pixel_rays
+from rein3d_jax.geometry.pinhole import pinhole_rays
 from rein3d_jax.geometry.resample import sample_sphere
 from rein3d_jax.geometry.sphere import pixels_from_rays
 from rein3d_jax.io.rooms.posed_panorama import pose_of_turn, rays_of_pose
@@ -94,7 +94,7 @@ def _rays(camera: Camera) -> np.ndarray:
     if camera.model == EQUIRECTANGULAR:
         return rays_of_pose(pose, SAMPLES * camera.height)
     size = (SAMPLES * camera.height, SAMPLES * camera.width)
-    rays = np.asarray(pixel_rays(*size, SAMPLES * camera.focal, SAMPLES * camera.centre), np.float64) @ pose[:3, :3].T
+    rays = np.asarray(pinhole_rays(*size, SAMPLES * camera.focal, SAMPLES * camera.centre), np.float64) @ pose[:3, :3].T
     return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
 
 

@@ -13,7 +13,7 @@ from experiments.reconstruct.quality import AT_ORIGIN, is_novel
 from rein3d_jax.errors import InputError
 from rein3d_jax.evaluate.inverse_distance import sample_inverse_distance
 from rein3d_jax.evaluate.regions import split
-from rein3d_jax.geometry.pinhole import pixel_rays
+from rein3d_jax.geometry.pinhole import pinhole_rays
 from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.geometry.sphere import rays_of_pose, world_from_camera_axes
 from rein3d_jax.io.rooms.posed_panorama import PosedPanorama
@@ -77,7 +77,7 @@ def _region(room: Room, camera: Camera, rays: jax.Array, distance: jax.Array) ->
 
 def _pinhole_rays(camera: Camera) -> jax.Array:
     """(h, w, 3) unit rays in the world."""
-    rays = pixel_rays(camera.height, camera.width, camera.focal, camera.centre)
+    rays = pinhole_rays(camera.height, camera.width, camera.focal, camera.centre)
     rays = rays / jnp.linalg.norm(rays, axis=-1, keepdims=True)
     return jnp.matmul(rays, camera.world_from_camera[:3, :3].T, precision=jax.lax.Precision.HIGHEST)
 

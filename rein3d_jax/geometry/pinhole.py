@@ -11,7 +11,7 @@ def focal_from_fov(fov: float, size: int) -> float:
     return size / (2 * math.tan(fov / 2))
 
 
-def pixel_rays(height: int, width: int, focal: jax.Array, centre: jax.Array) -> jax.Array:
+def pinhole_rays(height: int, width: int, focal: jax.Array, centre: jax.Array) -> jax.Array:
     """(height, width, 3) rays in camera axes with z = 1: a point is ray * depth along z."""
     u, v = jnp.meshgrid(jnp.arange(width) + 0.5, jnp.arange(height) + 0.5)
     x, y = (u - centre[0]) / focal[0], (v - centre[1]) / focal[1]

@@ -5,7 +5,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 
-from rein3d_jax.geometry.pinhole import pixel_rays
+from rein3d_jax.geometry.pinhole import pinhole_rays
 from rein3d_jax.geometry.sphere import pixels_from_rays
 from rein3d_jax.scene import Camera
 
@@ -35,7 +35,7 @@ def perspective_crop(image: jax.Array, world_from_panorama: jax.Array, camera: C
     """What a pinhole `camera` that stands where the panorama was taken sees of `image` (h, w, ...)."""
     exact = partial(jnp.matmul, precision=jax.lax.Precision.HIGHEST)  # an accelerator's default is 10 bits
     rotation = exact(world_from_panorama[:3, :3].T, camera.world_from_camera[:3, :3])
-    rays = exact(pixel_rays(camera.height, camera.width, camera.focal, camera.centre), rotation.T)
+    rays = exact(pinhole_rays(camera.height, camera.width, camera.focal, camera.centre), rotation.T)
     # pixels_from_rays speaks of an unturned panorama's world axes: +X is camera +z, +Y is -x, +Z is -y.
     rays = jnp.stack([rays[..., 2], -rays[..., 0], -rays[..., 1]], axis=-1)
     return sample_sphere(image, *pixels_from_rays(rays, image.shape[0], image.shape[1]))

@@ -2,16 +2,18 @@
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
+from rein3d_jax.geometry.array_namespace import array_namespace
 from rein3d_jax.geometry.safe import safe_norm
 
 
-def normalize_quats(quats: jax.Array) -> jax.Array:
+def normalize_quats(quats: jax.Array | np.ndarray) -> jax.Array | np.ndarray:
     """(..., 4) -> (..., 4) unit; the zero quaternion, which names no rotation, becomes the identity."""
     assert quats.shape[-1] == 4, quats.shape
-    norm = safe_norm(quats, keepdims=True)
-    identity = jnp.array([1.0, 0.0, 0.0, 0.0], quats.dtype)
-    return jnp.where(norm > 0, quats / jnp.where(norm > 0, norm, 1.0), identity)
+    xp, norm = array_namespace(quats), safe_norm(quats, keepdims=True)
+    identity = xp.array([1.0, 0.0, 0.0, 0.0], quats.dtype)
+    return xp.where(norm > 0, quats / xp.where(norm > 0, norm, 1.0), identity)
 
 
 def matrix_from_quats(quats: jax.Array) -> jax.Array:
@@ -25,9 +27,10 @@ def matrix_from_quats(quats: jax.Array) -> jax.Array:
     return jnp.stack([jnp.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def quats_from_matrix(matrix: jax.Array) -> jax.Array:
-    """(..., 3, 3) rotations -> (..., 4) unit wxyz. Of the four ways to write it, the one that divides by the largest
-    component (Shepperd 1978)."""
+def quats_from_matrix(matrix: jax.Array | np.ndarray) -> jax.Array | np.ndarray:
+    """(..., 3, 3) rotations -> (..., 4) unit wxyz, of either sign, in the precision of `matrix`. Of the four ways to
+    write it, the one that divides by the largest component (Shepperd 1978)."""
+    xp = array_namespace(matrix)
     m = [[matrix[..., i, j] for j in range(3)] for i in range(3)]
     trace = m[0][0] + m[1][1] + m[2][2]
     products = [  # row k: 4 q_k (w, x, y, z)
@@ -36,9 +39,9 @@ def quats_from_matrix(matrix: jax.Array) -> jax.Array:
         [m[0][2] - m[2][0], m[0][1] + m[1][0], 1 + 2 * m[1][1] - trace, m[1][2] + m[2][1]],
         [m[1][0] - m[0][1], m[0][2] + m[2][0], m[1][2] + m[2][1], 1 + 2 * m[2][2] - trace],
     ]
-    rows = jnp.stack([jnp.stack(row, axis=-1) for row in products], axis=-2)
-    largest = jnp.argmax(jnp.diagonal(rows, axis1=-2, axis2=-1), axis=-1)
-    return normalize_quats(jnp.take_along_axis(rows, largest[..., None, None], axis=-2)[..., 0, :])
+    rows = xp.stack([xp.stack(row, axis=-1) for row in products], axis=-2)
+    largest = xp.argmax(xp.diagonal(rows, axis1=-2, axis2=-1), axis=-1)
+    return normalize_quats(xp.take_along_axis(rows, largest[..., None, None], axis=-2)[..., 0, :])
 
 
 def multiply_quats(left: jax.Array, right: jax.Array) -> jax.Array:

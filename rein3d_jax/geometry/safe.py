@@ -2,13 +2,17 @@
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+
+from rein3d_jax.geometry.array_namespace import array_namespace
 
 
-def safe_norm(x: jax.Array, *, axis: int = -1, keepdims: bool = False) -> jax.Array:
+def safe_norm(x: jax.Array | np.ndarray, *, axis: int = -1, keepdims: bool = False) -> jax.Array | np.ndarray:
     """Euclidean norm with gradient 0 (not NaN) at x = 0."""
-    squared = jnp.sum(x * x, axis=axis, keepdims=keepdims)
+    xp = array_namespace(x)
+    squared = xp.sum(x * x, axis=axis, keepdims=keepdims)
     positive = squared > 0
-    return jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1.0)), 0.0)
+    return xp.where(positive, xp.sqrt(xp.where(positive, squared, 1.0)), 0.0)
 
 
 def safe_divide(numerator: jax.Array, denominator: jax.Array, *, otherwise: float = 0.0) -> jax.Array:

@@ -3,6 +3,10 @@ a `ray` is a unit vector in the world frame (or, for `*_camera_*`, in OpenCV cam
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+
+# World from camera axes of an equirectangular camera that is not rotated: OpenCV +z is +X, +x is -Y, +y is -Z.
+WORLD_FROM_CAMERA_AXES = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
 def azimuths(width: int) -> jax.Array:
@@ -36,15 +40,24 @@ def pixels_from_rays(rays: jax.Array, height: int, width: int) -> tuple[jax.Arra
 
 
 def world_from_camera_axes() -> jax.Array:
-    """(3, 3): the world rotation of an equirectangular camera that has not been turned; OpenCV +z is
-    world +X, +x is -Y, +y is -Z."""
-    return jnp.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    """WORLD_FROM_CAMERA_AXES (3, 3) as a JAX array, float32."""
+    return jnp.asarray(WORLD_FROM_CAMERA_AXES, jnp.float32)
 
 
 def rays_of_pose(world_from_camera: jax.Array, height: int, width: int) -> jax.Array:
     """(height, width, 3) unit rays, in the world, of an equirectangular camera at `world_from_camera` (4, 4)."""
     turn = jnp.matmul(world_from_camera[:3, :3], world_from_camera_axes().T, precision=jax.lax.Precision.HIGHEST)
     return jnp.matmul(pixel_rays(height, width), turn.T, precision=jax.lax.Precision.HIGHEST)
+
+
+def rays_of_pose64(world_from_camera: np.ndarray, height: int) -> np.ndarray:
+    """(height, 2 height, 3): `rays_of_pose` in NumPy's float64, as exact distances need it."""
+    azimuth = ((np.arange(2 * height) + 0.5) / (2 * height) - 0.5) * 2 * np.pi
+    latitude = ((0.5 - (np.arange(height) + 0.5) / height) * np.pi)[:, None]
+    flat = np.cos(latitude)
+    up = np.broadcast_to(np.sin(latitude), (height, 2 * height))
+    rays = np.stack([flat * np.cos(azimuth), -flat * np.sin(azimuth), up], axis=-1)
+    return rays @ (np.asarray(world_from_camera, np.float64)[:3, :3] @ WORLD_FROM_CAMERA_AXES.T).T
 
 
 def pixel_solid_angles(height: int, width: int) -> jax.Array:

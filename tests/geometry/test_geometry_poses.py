@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rein3d_jax.conventions import EQUIRECTANGULAR
-from rein3d_jax.geometry.pinhole import focal_from_fov, pixel_rays, pixels_from_points
+from rein3d_jax.geometry.pinhole import focal_from_fov, pinhole_rays, pixels_from_points
 from rein3d_jax.geometry.poses import equirectangular_camera, invert, pinhole_camera, rigid, upright
 from rein3d_jax.geometry.rotations import matrix_from_quats
 from rein3d_jax.geometry.sphere import world_from_camera_axes
@@ -41,7 +41,7 @@ def test_upright_looks_left_and_up(yaw: float, pitch: float) -> None:
 def test_pinhole_map_inverts_and_spans_its_field_of_view() -> None:
     camera = pinhole_camera(upright(jnp.zeros(3)), 16, np.pi / 2)
     depth = 1 + jax.random.uniform(jax.random.key(2), (16, 16, 1))
-    rays = pixel_rays(16, 16, camera.focal, camera.centre)
+    rays = pinhole_rays(16, 16, camera.focal, camera.centre)
     u, v = pixels_from_points(rays * depth, camera.focal, camera.centre)
     np.testing.assert_allclose(u, np.broadcast_to(np.arange(16) + 0.5, (16, 16)), atol=ATOL)
     np.testing.assert_allclose(v, np.broadcast_to(np.arange(16)[:, None] + 0.5, (16, 16)), atol=ATOL)

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rein3d_jax.geometry.pinhole import pixel_rays as pinhole_rays
+from rein3d_jax.geometry.pinhole import pinhole_rays
 from rein3d_jax.geometry.poses import pinhole_camera, rigid, upright
 from rein3d_jax.geometry.resample import pad_sphere, perspective_crop, sample_sphere
 from rein3d_jax.geometry.rotations import matrix_from_quats

@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from rein3d_jax.geometry.covariance import scaled_axes
 from rein3d_jax.geometry.rotations import (
@@ -68,6 +69,13 @@ def test_a_matrix_gives_back_its_quaternion() -> None:
     quats = normalize_quats(jnp.concatenate([jax.random.normal(jax.random.key(8), (100, 4)), jnp.eye(4)]))
     dot = jnp.sum(quats * quats_from_matrix(matrix_from_quats(quats)), axis=-1)
     np.testing.assert_allclose(jnp.abs(dot), 1, atol=1e-6)  # float32
+
+
+def test_a_numpy_matrix_keeps_its_precision() -> None:
+    matrix = np.array([[0.0, -0.6, 0.8], [1.0, 0.0, 0.0], [0.0, 0.8, 0.6]])
+    w, *axis = quats_from_matrix(matrix)
+    assert isinstance(w, np.float64) and w**2 + np.square(axis).sum() == pytest.approx(1, abs=1e-15)
+    np.testing.assert_allclose(matrix @ axis, axis, atol=1e-15)  # float64
 
 
 def test_safe_functions_at_and_off_their_singular_point() -> None:

@@ -5,19 +5,21 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rein3d_jax.geometry.poses import rigid
+from rein3d_jax.geometry.poses import rigid, upright
 from rein3d_jax.geometry.sphere import (
     azimuths,
     horizontal_direction,
     pixel_rays,
     pixel_solid_angles,
     pixels_from_rays,
+    rays_of_pose,
+    rays_of_pose64,
     world_from_camera_axes,
 )
 
 
 def test_unproject_then_project_is_the_identity() -> None:
-    """The issue's bar: 1e-3 pixel at 512 x 1024, float32, points metres away and not only unit rays."""
+    """To 1e-3 pixel at 512 x 1024 in float32, for points metres away and not only unit rays."""
     height, width = 512, 1024
     distance = 0.5 + 9 * jax.random.uniform(jax.random.key(0), (height, width, 1))
     u, v = pixels_from_rays(pixel_rays(height, width) * distance, height, width)
@@ -83,6 +85,13 @@ def test_camera_axes_look_along_the_centre_column() -> None:
     np.testing.assert_array_equal(axes @ [1, 0, 0], [0, -1, 0])  # right is -Y
     np.testing.assert_array_equal(axes @ [0, 1, 0], [0, 0, -1])  # down is -Z
     assert rigid(world_from_camera_axes(), jnp.zeros(3)).shape == (4, 4)
+
+
+def test_both_precisions_give_the_same_rays() -> None:
+    pose = upright(jnp.array([1.0, 2.0, 3.0]), 0.7, -0.3)
+    exact = rays_of_pose64(np.asarray(pose), 8)
+    assert exact.dtype == np.float64
+    np.testing.assert_allclose(rays_of_pose(pose, 8, 16), exact, atol=1e-6)  # float32 sines through one product
 
 
 def test_azimuths_are_centred_and_even() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rein3d_jax.conventions import EQUIRECTANGULAR
-from rein3d_jax.geometry.pinhole import pixel_rays as pinhole_rays
+from rein3d_jax.geometry.pinhole import pinhole_rays
 from rein3d_jax.geometry.poses import upright
 from rein3d_jax.geometry.sphere import pixel_rays, world_from_camera_axes
 from rein3d_jax.refine import RefineConfig, join_views, views_from_panorama
