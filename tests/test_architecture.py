@@ -51,7 +51,6 @@ HOMES = {
     "safetensors": ("rein3d_jax/io/weights/",),
     "matplotlib": ("experiments/evaluate/chart.py", "experiments/ablate/chart.py"),
     "array_record": ("rein3d_jax/io/pairs/",),
-    "grain": ("experiments/pair_batches.py",),
     "ray": ("experiments/build_dataset/ray_workers.py",),
     "tensorboardX": ("rein3d_jax/io/files/training_log.py",),
     "embreex": ("rein3d_jax/meshes/ray_caster.py",),

@@ -7,15 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from experiments import pair_batches
-from experiments.pair_batches import DrawnPairs
 from rein3d_jax.errors import InputError
 from rein3d_jax.evaluate.metrics import psnr
 from rein3d_jax.geometry.poses import upright
 from rein3d_jax.geometry.shell import RoomShell, meet_shell
 from rein3d_jax.geometry.sphere import rays_of_pose
 from rein3d_jax.pipeline import pairs
-from rein3d_jax.pipeline.pairs import Drawn, PairConfig, degrade, make_pair, scene_pair, with_buffers
+from rein3d_jax.pipeline.pairs import Drawn, PairConfig, degrade, make_pair, room_pair, scene_pair, with_buffers
 from rein3d_jax.rooms.config import RoomConfig
 from rein3d_jax.scene import Panorama
 
@@ -94,21 +92,10 @@ def test_buffers_grow_until_nothing_is_dropped(drawn, monkeypatch):
     np.testing.assert_allclose(whole.alpha, drawn.pair.degraded.alpha, atol=1e-5)  # and it is what the pair holds
 
 
-def test_pairs_made_on_the_device_are_those_of_their_keys(monkeypatch):
-    def keyed(key, config):
-        """Stands for a room: what is drawn is the key."""
-        return Drawn(jax.random.uniform(key), jnp.float32(config.length), jnp.int32(1), jnp.zeros(4, jnp.int32))
-
-    monkeypatch.setattr(pair_batches, "room_pair", keyed)
-    source = DrawnPairs(dataclasses.replace(CONFIG, rate=11.0), batch=2, seed=7, host=1, hosts=2)
-    indices = (3 * 2 + 1) * 2 + jnp.arange(2)  # step 3, host 1: no other step or host has these
-    expected = [jax.random.uniform(jax.random.fold_in(jax.random.key(7), index)) for index in indices]
-    np.testing.assert_array_equal(source.at(3), jnp.stack(expected))
-
-
 def test_pairs_can_be_made_on_an_accelerator():
     keys = jax.random.split(jax.random.key(0), 2)
-    exported = jax.export.export(pair_batches._batch, platforms=("cuda", "tpu"))(keys, config=with_buffers(CONFIG))
+    batch = jax.jit(jax.vmap(lambda key: room_pair(key, with_buffers(CONFIG))))
+    exported = jax.export.export(batch, platforms=("cuda", "tpu"))(keys)
     shapes = {(2, 3, 16, 32, 3), (2, 3, 16, 32), (2, 3, 4, 4), (2,), (2, 4)}
     assert {aval.shape for aval in exported.out_avals} == shapes
 

@@ -14,7 +14,6 @@ from experiments.build_dataset import __main__ as build_dataset
 from experiments.build_dataset import dataset, pair_scenes
 from experiments.build_dataset.dataset import DatasetConfig, build_part, shard_path
 from experiments.build_dataset.ray_workers import build_with_ray
-from experiments.pair_batches import StoredPairs
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.pairs.pair_shard import PairDataset
 from rein3d_jax.pipeline.pairs import Drawn
@@ -138,19 +137,6 @@ def test_a_scene_without_a_path_is_left_out_and_named(config, tmp_path, monkeypa
     monkeypatch.setattr(dataset, "clip_walks", walks_of(fails=set(range(7))))
     with pytest.raises(InputError, match="no clip could be made: clip 0"):
         build(at(config, tmp_path, "none", scenes=scenes))
-
-
-def test_batches_are_a_function_of_seed_and_step(config):
-    build(config)
-    pairs = StoredPairs(config.output, batch=2, seed=3)
-    (first, later), again = (pairs.at(0), pairs.at(5)), StoredPairs(config.output, batch=2, seed=3)
-    assert first.clean.rgb.shape == (2, 2, 8, 16, 3)
-    np.testing.assert_array_equal(again.at(5).clean.rgb, later.clean.rgb)  # a resumed run's sixth step
-    assert not np.array_equal(StoredPairs(config.output, batch=2, seed=4).at(0).clean.rgb, first.clean.rgb)
-    hosts = [StoredPairs(config.output, batch=1, seed=3, host=host, hosts=2).at(0) for host in range(2)]
-    assert not np.array_equal(hosts[0].clean.rgb, hosts[1].clean.rgb)
-    with pytest.raises(InputError, match="holds 7 pairs, and a step takes 8"):
-        StoredPairs(config.output, batch=4, hosts=2)
 
 
 @pytest.fixture
