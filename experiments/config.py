@@ -2,8 +2,8 @@
 name; the result is hashable, so that each stage's part can be a static argument of jit.
 
 A field is an int, float, bool, str, a tuple of those, one of those `| None` (written "none"), or another config.
-A config checks its own ranges in `__post_init__`: it raises InputError("steps must ...") and comes out of here as
-"refine.steps must ..."."""
+A config checks itself when it is made (settings.py): it raises InputError("steps must ...") and comes out of here
+as "refine.steps must ..."."""
 
 import dataclasses
 import difflib
@@ -21,15 +21,16 @@ from rein3d_jax.errors import InputError
 
 Config = TypeVar("Config")
 
+RECIPES = Path(__file__).parent / "recipes"
 NONE = "none"  # TOML has no null
 KINDS = {int: "a whole number", float: "a number", bool: "true or false", str: "text in quotes"}
 
 
-def load_config(cls: type[Config], path: str | Path, overrides: Sequence[str] = ()) -> Config:
-    """The recipe at `path` as a `cls`, each override "stage.key=value" laid over it in turn.
+def load_config(cls: type[Config], recipe: str | Path, overrides: Sequence[str] = ()) -> Config:
+    """A `cls` of the `recipe`, as read_recipe finds it, each override "stage.key=value" laid over it in turn.
 
     Raises InputError for a file that cannot be read, for an unknown or missing key, a wrong type, a failed check."""
-    return config_from(cls, read_recipe(path), overrides)
+    return config_from(cls, read_recipe(recipe), overrides)
 
 
 def config_from(cls: type[Config], table: Mapping, overrides: Sequence[str] = ()) -> Config:
@@ -45,9 +46,20 @@ def dump_config(config: Any) -> str:
     return "\n".join(_tables(config, "")).lstrip("\n") + "\n"
 
 
-def read_recipe(path: str | Path) -> dict:
-    """The recipe's table as it stands. Raises InputError for a file that cannot be read."""
-    path = Path(path)
+def recipe_path(name: str | Path) -> Path:
+    """The file `name`, or the packaged recipe of that name, with or without .toml. Raises InputError for neither."""
+    path = Path(name)
+    packaged = {recipe.stem: recipe for recipe in sorted(RECIPES.glob("*.toml"))}
+    if path.is_file() or path.parent != Path():
+        return path
+    if (stem := path.name.removesuffix(".toml")) not in packaged:
+        raise InputError(f"{name} is no file, and no packaged recipe; those are {', '.join(packaged)}; check --config")
+    return packaged[stem]
+
+
+def read_recipe(name: str | Path) -> dict:
+    """The table of a recipe's file, or of the packaged recipe `name`. Raises InputError where it cannot be read."""
+    path = recipe_path(name)
     try:
         return tomllib.loads(path.read_text("utf-8-sig"))
     except OSError as error:
@@ -164,12 +176,13 @@ def _tables(config: Any, prefix: str) -> Iterator[str]:
     """The lines of a table: its values first, as TOML wants, then the tables inside it."""
     values = {field.name: getattr(config, field.name) for field in dataclasses.fields(config)}
     inner = {name: value for name, value in values.items() if dataclasses.is_dataclass(value)}
-    yield from (f"{name} = {_toml(value)}" for name, value in values.items() if name not in inner)
+    yield from (f"{name} = {toml_value(value)}" for name, value in values.items() if name not in inner)
     for name, value in inner.items():
         yield from (f"\n[{prefix}{name}]", *_tables(value, f"{prefix}{name}."))
 
 
-def _toml(value: Any) -> str:
+def toml_value(value: Any) -> str:
+    """The TOML text of a recipe's value."""
     if value is None:
         return f'"{NONE}"'
     if isinstance(value, bool):
@@ -177,5 +190,5 @@ def _toml(value: Any) -> str:
     if isinstance(value, str):  # TOML's escapes are JSON's, but for DEL
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, tuple):
-        return f"[{', '.join(map(_toml, value))}]"
+        return f"[{', '.join(map(toml_value, value))}]"
     return repr(value)

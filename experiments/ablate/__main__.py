@@ -26,7 +26,7 @@ import jax
 import numpy as np
 
 from experiments.ablate.chart import ablation_chart
-from experiments.compile_cache import use_compile_cache
+from experiments.command import CommandParser
 from experiments.config import config_from, read_recipe
 from experiments.example_store import ExampleStore
 from experiments.train_restore.config import TrainConfig
@@ -50,26 +50,22 @@ class Ablation:
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where the input is at fault."""
-    parser = argparse.ArgumentParser(prog="python -m experiments.ablate", description=__doc__.splitlines()[0])
-    parser.add_argument("--config", required=True, help="a recipe with a table [ablation]")
+    parser = CommandParser("ablate", __doc__)
+    parser.add_recipe(TrainConfig, example="ablate_restorer")
     parser.add_argument("--json", required=True, metavar="FILE", help="where to write the figures")
     parser.add_argument("--picture", metavar="PNG", help="draw gain against seconds, by sampler steps")
-    parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="change one key of the recipe")
-    options = parser.parse_args(arguments)
-    use_compile_cache()
-    try:
-        recipe = read_recipe(options.config)
-        ablation = _ablation(recipe.pop("ablation", None), options.config)
-        jobs = {name: [*options.set, *changes] for name, changes in ablation.variants.items()}
-        configs = {name: config_from(TrainConfig, recipe, changes) for name, changes in jobs.items()}
-        rows = {name: _scores(name, config, ablation) for name, config in configs.items()}
-        write_text(options.json, json.dumps({"config": recipe, "variants": rows}, indent=1) + "\n")
-        if options.picture is not None:
-            ablation_chart(rows, ablation.sampler_steps, Path(options.picture))
-    except InputError as error:
-        print(f"ablate: {error}", file=sys.stderr)
-        return 2
-    return 0
+    return parser.run(_compare, arguments)
+
+
+def _compare(options: argparse.Namespace) -> None:
+    recipe = read_recipe(options.config)
+    ablation = _ablation(recipe.pop("ablation", None), options.config)
+    jobs = {name: [*options.set, *changes] for name, changes in ablation.variants.items()}
+    configs = {name: config_from(TrainConfig, recipe, changes) for name, changes in jobs.items()}
+    rows = {name: _scores(name, config, ablation) for name, config in configs.items()}
+    write_text(options.json, json.dumps({"config": recipe, "variants": rows}, indent=1) + "\n")
+    if options.picture is not None:
+        ablation_chart(rows, ablation.sampler_steps, Path(options.picture))
 
 
 def _ablation(table, recipe: str) -> Ablation:

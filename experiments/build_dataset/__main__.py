@@ -14,7 +14,7 @@ import jax
 
 from experiments.build_dataset.dataset import DatasetConfig, build_part
 from experiments.build_dataset.ray_workers import build_with_ray
-from experiments.compile_cache import use_compile_cache
+from experiments.command import CommandParser
 from experiments.config import load_config
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.pairs.pair_shard import PairDataset
@@ -23,20 +23,8 @@ from rein3d_jax.parallel import join_hosts
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with a line on stderr for each thing that is at fault."""
-    options = _parser().parse_args(arguments)
-    use_compile_cache()
-    try:
-        _run(options)
-    except InputError as error:
-        print(f"build_dataset: {error}", file=sys.stderr)
-        return 2
-    return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m experiments.build_dataset", description=__doc__.splitlines()[0])
-    parser.add_argument("--config", required=True, help="a recipe, such as experiments/recipes/tiny_pairs.toml")
-    parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="change one key of the recipe")
+    parser = CommandParser("build_dataset", __doc__)
+    parser.add_recipe(DatasetConfig, example="tiny_pairs")
     parser.add_argument("--check", action="store_true", help="build nothing: name the damaged shards")
     workers = parser.add_mutually_exclusive_group()
     workers.add_argument("--worker", metavar="I/N", help="build only the share of worker I, from 0, of N")
@@ -45,10 +33,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--ray-address", metavar="A", help="of a Ray cluster; without it one is started here")
     parser.add_argument("--processes", type=int, metavar="N", help="with --address: how many there are")
     parser.add_argument("--process", type=int, metavar="I", help="with --address: this one's number, from 0")
-    return parser
+    return parser.run(_build, arguments)
 
 
-def _run(options: argparse.Namespace) -> None:
+def _build(options: argparse.Namespace) -> None:
     config = load_config(DatasetConfig, options.config, options.set)
     if options.check:
         if faults := PairDataset(config.output).faults():

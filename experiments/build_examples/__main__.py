@@ -1,5 +1,4 @@
-"""Make the training examples of the learned restorer: walks through drawn rooms, what the first panorama shows of
-them, and its fills.
+"""Make the training examples of the learned restorer: clips through drawn rooms, degraded and filled.
 
     python -m experiments.build_examples --config experiments/recipes/tiny_examples.toml [--set key=value ...]
 
@@ -16,6 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from experiments.command import CommandParser
 from experiments.config import load_config
 from experiments.example_store import write_examples
 from rein3d_jax.depth.shell_from_distance import shell_from_distance
@@ -30,15 +30,15 @@ from rein3d_jax.restore import background_of
 from rein3d_jax.restore.background import Background
 from rein3d_jax.restore.learned.candidates import clip_of
 from rein3d_jax.restore.learned.loss import Example
-from rein3d_jax.restore.learned.predict import halved
+from rein3d_jax.restore.learned.predict import halved_clip
 from rein3d_jax.rooms.config import RoomConfig
 from rein3d_jax.rooms.generate import room
 from rein3d_jax.rooms.model import Room
 from rein3d_jax.rooms.tracing.trace import trace
 from rein3d_jax.scene import Panorama
 
-SCOUT = 32  # rows of the panoramas by which a walk is chosen and the shell found
-ATTEMPTS = 200  # rooms drawn for one walk
+_SCOUT = 32  # rows of the panoramas by which a walk is chosen and the shell found
+_ATTEMPTS = 200  # rooms drawn for one walk
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,19 +66,16 @@ class ExamplesConfig:
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where the input is at fault."""
-    parser = argparse.ArgumentParser(prog="python -m experiments.build_examples", description=__doc__.splitlines()[0])
-    parser.add_argument("--config", required=True, help="a recipe, such as experiments/recipes/tiny_examples.toml")
-    parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="change one key of the recipe")
-    options = parser.parse_args(arguments)
-    try:
-        config = load_config(ExamplesConfig, options.config, options.set)
-        for done in write_examples(config.output, partial(example, config=config), config.count):
-            if done % 20 == 0 or done == config.count:
-                print(f"{done}/{config.count} examples", flush=True)
-    except InputError as error:
-        print(f"build_examples: {error}", file=sys.stderr)
-        return 2
-    return 0
+    parser = CommandParser("build_examples", __doc__)
+    parser.add_recipe(ExamplesConfig, example="tiny_examples")
+    return parser.run(_build, arguments)
+
+
+def _build(options: argparse.Namespace) -> None:
+    config = load_config(ExamplesConfig, options.config, options.set)
+    for done in write_examples(config.output, partial(example, config=config), config.count):
+        if done % 20 == 0 or done == config.count:
+            print(f"{done}/{config.count} examples", flush=True)
 
 
 def example(index: int, config: ExamplesConfig) -> Example:
@@ -99,20 +96,20 @@ def example(index: int, config: ExamplesConfig) -> Example:
 def _walk(key: jax.Array, index: int, config: ExamplesConfig):
     """(room, start (3,), places (t, 3) from there, a key for what is left to draw)."""
     rooms = dataclasses.replace(config.rooms, furnished=config.furnished[index % len(config.furnished)])
-    for attempt in range(ATTEMPTS):
+    for attempt in range(_ATTEMPTS):
         room_key, walk_key, rest = jax.random.split(jax.random.fold_in(key, attempt), 3)
         place = _room(room_key, rooms)
         start, offsets, hidden = _draw_walk(walk_key, place, config)
         if float(hidden) >= config.hidden:
             return place, start, offsets, rest
-    raise InputError(f"none of {ATTEMPTS} rooms has a walk of {config.shortest:g} m that uncovers {config.hidden:g}")
+    raise InputError(f"none of {_ATTEMPTS} rooms has a walk of {config.shortest:g} m that uncovers {config.hidden:g}")
 
 
 @partial(jax.jit, static_argnames="config")
 def _draw_walk(key: jax.Array, place: Room, config: ExamplesConfig):
     """(start, places, share of the last frame that is hidden from the start; -1 where the path is too short)."""
     long, begin, way, steps = jax.random.split(key, 4)
-    seen = trace(place, _pose(jnp.zeros(3)), SCOUT).distance
+    seen = trace(place, _pose(jnp.zeros(3)), _SCOUT).distance
     path = longest_chord(seen, seen > 0, config=config.explore)
     most = jnp.minimum(path.length, config.longest)
     length = jax.random.uniform(long, minval=config.shortest, maxval=jnp.maximum(most, config.shortest))
@@ -128,7 +125,7 @@ def _draw_walk(key: jax.Array, place: Room, config: ExamplesConfig):
 
 def _hidden(place: Room, start: jax.Array, offset: jax.Array) -> jax.Array:
     """Share of the pixels seen at start + offset that lie behind what is seen from start."""
-    both = trace(place, _pose(jnp.stack([start, start + offset])), SCOUT).distance
+    both = trace(place, _pose(jnp.stack([start, start + offset])), _SCOUT).distance
     both = jnp.where(both > 0, both, 100.0)
     points = offset + both[1][..., None] * pixel_rays(*both.shape[1:])
     inverse = sample_sphere(1 / both[0][..., None], *pixels_from_rays(points, *both.shape[1:]))[..., 0]
@@ -137,7 +134,7 @@ def _hidden(place: Room, start: jax.Array, offset: jax.Array) -> jax.Array:
 
 def _background(key: jax.Array, place: Room, start: jax.Array, source: Panorama, config) -> Background | None:
     """The shell as the main job finds it, or off: what is trained on walls that fit trusts them blindly."""
-    seen = _trace(place, _pose(start), SCOUT)
+    seen = _trace(place, _pose(start), _SCOUT)
     shell, support = shell_from_distance(Panorama(seen.rgb, seen.distance, seen.distance > 0))
     if float(support) < config.shell_support:
         return None
@@ -152,7 +149,7 @@ def _pose(position: jax.Array) -> jax.Array:
 
 _room = jax.jit(room, static_argnums=1)
 _trace = jax.jit(trace, static_argnames="height")
-_halved = jax.jit(halved)
+_halved = jax.jit(halved_clip)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -9,7 +9,6 @@ done is kept in the --work folder, by recipe, room and method: the same command 
 a restorer are not noticed: give another folder.
 """
 
-import argparse
 import hashlib
 import importlib.metadata
 import json
@@ -22,7 +21,7 @@ from pathlib import Path
 
 import jax
 
-from experiments.compile_cache import use_compile_cache
+from experiments.command import CommandParser
 from experiments.compiled_programs import forget_when_many
 from experiments.config import load_config
 from experiments.evaluate.chart import chart
@@ -40,37 +39,25 @@ from rein3d_jax.io.weights.metric_weights import brisque_weights, i3d_weights, l
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where the input is at fault."""
-    options = _parser().parse_args(arguments)
-    use_compile_cache()
-    try:
-        _run(options)
-    except InputError as error:
-        print(f"evaluate: {error}", file=sys.stderr)
-        return 2
-    return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m experiments.evaluate", description=__doc__.splitlines()[0])
-    parser.add_argument("--config", metavar="RECIPE", help="the main job's, such as experiments/recipes/quick.toml")
+    parser = CommandParser("evaluate", __doc__)
+    parser.add_recipe(ReconstructConfig, default="quick")
     parser.add_argument("--rooms", metavar="FOLDER", help="of rooms in the layout of ../shared/rooms, or one room")
     parser.add_argument("--json", metavar="FILE", help="where to write the figures")
     parser.add_argument("--protocol", metavar="A,B", help=f"of {', '.join(map(_spoken, PROTOCOLS))}; default: all")
     parser.add_argument("--methods", metavar="A,B", help="default: all; `refined` runs the main job, minutes a room")
     parser.add_argument("--limit", metavar="N", type=int, help="only the first N rooms")
-    parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="change one key of the recipe")
     parser.add_argument("--i3d", metavar="FILE", help="I3D's weights: the Frechet distance is then the FVD")
     parser.add_argument("--work", metavar="FOLDER", default="runs/evaluate", help="where finished rooms are kept")
     parser.add_argument("--chart", metavar="JSON", nargs="*", help="draw result files (default: the one of --json)")
     parser.add_argument("--picture", metavar="PNG", help="the chart's file (default: beside the first result)")
-    return parser
+    return parser.run(_run, arguments)
 
 
 def _run(options) -> None:
     if options.rooms is not None:
         evaluate(options)
     elif options.chart is None:
-        raise InputError("give --config, --rooms and --json to measure, or --chart and result files to draw")
+        raise InputError("give --rooms and --json to measure, or --chart and result files to draw")
     if options.chart is not None:
         files = [Path(name) for name in options.chart or filter(None, [options.json])]
         if not files:
@@ -82,8 +69,8 @@ def _run(options) -> None:
 
 def evaluate(options) -> None:
     """Measures and writes the JSON file. Raises InputError before the long part for whatever it can tell by then."""
-    if options.config is None or options.json is None:
-        raise InputError("--rooms also needs --config RECIPE and --json FILE")
+    if options.json is None:
+        raise InputError("--rooms also needs --json FILE")
     if options.limit is not None and options.limit < 1:
         raise InputError(f"--limit {options.limit} leaves no room: give 1 or more")
     config = load_config(ReconstructConfig, options.config, options.set)

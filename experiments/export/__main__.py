@@ -12,12 +12,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from experiments.compile_cache import use_compile_cache
+from experiments.command import CommandParser
 from experiments.export.posed_pictures import posed_pictures
 from experiments.export.scene_mesh import MeshConfig, scene_mesh
 from experiments.export.scene_panoramas import write_panoramas
 from experiments.run_folder import RunFolder, open_run
-from rein3d_jax.errors import InputError
 from rein3d_jax.io.exports.colmap import write_colmap
 from rein3d_jax.io.exports.nerfstudio import write_nerfstudio
 from rein3d_jax.io.exports.point_cloud import points_of
@@ -30,21 +29,7 @@ SCENES = ("ply", "compressed.ply", "spz", "splat")
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where the input is at fault."""
-    options = _parser().parse_args(arguments)
-    use_compile_cache()
-    try:
-        run = open_run(options.run)
-        output = Path(options.output) if options.output else run.path / "export"
-        for name in options.to:
-            print(KINDS[name](run, output, options) if name in KINDS else _scene(run, output, name))
-    except InputError as error:
-        print(f"export: {error}", file=sys.stderr)
-        return 2
-    return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m experiments.export", description=__doc__.splitlines()[0])
+    parser = CommandParser("export", __doc__)
     parser.add_argument("run", metavar="RUN_FOLDER", help="what reconstruct wrote, with its stages folder")
     kinds = [*KINDS, *SCENES]
     parser.add_argument("--to", nargs="+", required=True, choices=kinds, metavar="KIND",
@@ -53,7 +38,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--voxel", type=float, default=MeshConfig.voxel, help="mesh: metres (default: %(default)s)")
     loose = "mesh: drop loose parts below this area, square metres (default: %(default)s)"
     parser.add_argument("--island", type=float, default=MeshConfig.island, help=loose)
-    return parser
+    return parser.run(_export, arguments)
+
+
+def _export(options: argparse.Namespace) -> None:
+    run = open_run(options.run)
+    output = Path(options.output) if options.output else run.path / "export"
+    for name in options.to:
+        print(KINDS[name](run, output, options) if name in KINDS else _scene(run, output, name))
 
 
 def _nerfstudio(run: RunFolder, output: Path, options) -> str:

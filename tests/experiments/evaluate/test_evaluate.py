@@ -203,6 +203,6 @@ def test_rooms_that_lack_a_part(part, protocol, message, recipe, rooms, tmp_path
 
 
 def test_nothing_to_do_is_said(capsys):
-    assert evaluate.main([]) == 2 and "give --config" in capsys.readouterr().err
-    assert evaluate.main(["--rooms", "x"]) == 2 and "--config RECIPE and --json" in capsys.readouterr().err
+    assert evaluate.main([]) == 2 and "give --rooms" in capsys.readouterr().err
+    assert evaluate.main(["--rooms", "x"]) == 2 and "also needs --json" in capsys.readouterr().err
     assert evaluate.main(["--chart"]) == 2 and "needs result files" in capsys.readouterr().err
