@@ -2,9 +2,9 @@
 
     w_i = alpha_i T_i,   T_{i+1} = T_i (1 - alpha_i),   image = sum_i w_i value_i     (Kerbl et al. 2023, eq. 3)
 
-A chunk is a loop over its Gaussians, vectorised over chunks x pixels with the pixels innermost, a few Gaussians a
-turn: the carry then travels to the cache less often. A turn gathers its Gaussians' numbers itself, so that nothing is
-stored for a (Gaussian, tile) pair but its index. Chunks of a tile join by the associative "over". The reverse pass
+A chunk is a loop over its Gaussians, vectorised over chunks x pixels with the pixels innermost, unrolled by a few
+Gaussians: the carry then travels to the cache less often. A step gathers its Gaussians' numbers itself, so that nothing
+is stored for a (Gaussian, tile) pair but its index. Chunks of a tile join by the associative "over". The reverse pass
 walks front to back too, with the weighted sum still to come as its carry, so nothing per evaluation is stored and
 nothing is divided by a small transmittance; its sums over pixels are products with the pixels' monomials. What each
 of these gains is in benchmarks/NOTES.md.
@@ -18,13 +18,13 @@ import jax.numpy as jnp
 from rein3d_jax.conventions import ALPHA_CUT, ALPHA_MAX
 from rein3d_jax.rasterize.pixels import tile_pixels
 from rein3d_jax.rasterize.project import Splats
-from rein3d_jax.rasterize.quadratic import axes_entries, coefficients, evaluate, monomials, slopes, terms
+from rein3d_jax.rasterize.quadratic import axes_entries, coefficients, evaluate_quadratic, monomials, terms
 from rein3d_jax.rasterize.tile import Chunks
 from rein3d_jax.scene import Camera
 
-BLOCK = 512  # chunks handled at a time: their carry fits a core's second-level cache
-TURN = 4  # Gaussians a turn of the loop
-EMPTY = -100.0  # log opacity of a slot without a Gaussian: alpha 0
+_BLOCK = 512  # chunks handled at a time: their carry fits a core's second-level cache
+_UNROLL = 4  # Gaussians a step of the loop
+_EMPTY = -100.0  # log opacity of a slot without a Gaussian: alpha 0
 
 
 def splat_table(splats: Splats, values: jax.Array) -> jax.Array:
@@ -33,7 +33,7 @@ def splat_table(splats: Splats, values: jax.Array) -> jax.Array:
     k = splats.mean.shape[1]
     axes = [splats.axes[:, i, j] for i, j in axes_entries(k)]
     table = jnp.stack([*splats.mean.T, *axes, splats.log_opacity, *values.T], axis=-1)
-    return jnp.concatenate([table, jnp.zeros_like(table[:1]).at[0, k + len(axes)].set(EMPTY)])
+    return jnp.concatenate([table, jnp.zeros_like(table[:1]).at[0, k + len(axes)].set(_EMPTY)])
 
 
 def _unpack(rows: jax.Array, anchors: jax.Array) -> tuple[list, list]:
@@ -48,18 +48,18 @@ def _unpack(rows: jax.Array, anchors: jax.Array) -> tuple[list, list]:
 
 def _alpha(row, planes):
     """Coefficients (terms(k) x (b,)), pixels k x (b or 1, p) -> raw and cut, clamped alpha (b, p)."""
-    raw = jnp.exp(evaluate([c[:, None] for c in row], planes))
+    raw = jnp.exp(evaluate_quadratic([c[:, None] for c in row], planes))
     return raw, jnp.where(raw < ALPHA_CUT, 0.0, jnp.minimum(raw, ALPHA_MAX))
 
 
 class _Blocks:
-    """The chunks in use, block by block. Loops have as many turns as there are chunks and Gaussians: buffers may be
+    """The chunks in use, block by block. Loops have as many steps as there are chunks and Gaussians: buffers may be
     roomy at no cost."""
 
     def __init__(self, chunks: Chunks, anchors: jax.Array, pixels: jax.Array):
         length, capacity = chunks.ids.shape
         self.chunks, self.anchors, self.pixels = chunks, anchors, pixels
-        self.block, self.turn = math.gcd(capacity, BLOCK), math.gcd(length, TURN)
+        self.block, self.unroll = math.gcd(capacity, _BLOCK), math.gcd(length, _UNROLL)
         self.count = -(-jnp.sum(chunks.fill > 0) // self.block)
 
     def part(self, x: jax.Array, index) -> jax.Array:
@@ -75,14 +75,14 @@ class _Blocks:
         pixels = self.pixels if self.pixels.shape[0] == 1 else self.by_tile(self.pixels, index)
         return list(jnp.moveaxis(pixels, 1, 0))
 
-    def turns(self, index) -> jax.Array:
+    def steps(self, index) -> jax.Array:
         """As many as the block's first chunk needs, which is its fullest."""
-        return -(-self.chunks.fill[index * self.block] // self.turn)
+        return -(-self.chunks.fill[index * self.block] // self.unroll)
 
     def rows(self, table: jax.Array, index, number) -> jax.Array:
-        """Rows (turn, block, m) of the table for turn `number` of the block."""
-        place = (number * self.turn, index * self.block)
-        return table[jax.lax.dynamic_slice(self.chunks.ids, place, (self.turn, self.block))]
+        """Rows (unroll, block, m) of the table for step `number` of the block."""
+        place = (number * self.unroll, index * self.block)
+        return table[jax.lax.dynamic_slice(self.chunks.ids, place, (self.unroll, self.block))]
 
 
 def _chunk_layers(table, anchors, pixels, chunks):
@@ -93,17 +93,17 @@ def _chunk_layers(table, anchors, pixels, chunks):
     def composite_block(index, layers):
         near, planes = blocks.by_tile(anchors, index), blocks.planes(index)
 
-        def turn(number, state):
+        def step(number, state):
             through, sums = state
             of_terms, of_values = _unpack(blocks.rows(table, index, number), near)
-            for u in range(blocks.turn):
+            for u in range(blocks.unroll):
                 weight = _alpha([c[u] for c in of_terms], planes)[1] * through
                 sums = [s + weight * value[u][:, None] for s, value in zip(sums, of_values, strict=True)]
                 through = through - weight
             return through, sums
 
         empty = jnp.zeros((blocks.block, area), table.dtype)
-        through, sums = jax.lax.fori_loop(0, blocks.turns(index), turn, (empty + 1, [empty] * values))
+        through, sums = jax.lax.fori_loop(0, blocks.steps(index), step, (empty + 1, [empty] * values))
         return jax.lax.dynamic_update_slice_in_dim(layers, jnp.stack([*sums, through], 1), index * blocks.block, 0)
 
     start = jnp.zeros((chunks.tile.shape[0], values + 1, area), table.dtype)
@@ -112,7 +112,7 @@ def _chunk_layers(table, anchors, pixels, chunks):
 
 def _along_tile(operator, values, rank):
     """Inclusive scan of `values` (c, p), listed by tile, by `operator` over each tile's chunks, whose places in their
-    tile are `rank` (c,). Hillis and Steele's doubling, in as many turns as the longest list calls for;
+    tile are `rank` (c,). Hillis and Steele's doubling, in as many steps as the longest list calls for;
     lax.associative_scan says the same in 10 times the compilation time."""
 
     def double(state):
@@ -131,19 +131,18 @@ def _before(through, chunks):
 
 
 @jax.custom_vjp
-def composite(table: jax.Array, anchors: jax.Array, pixels: jax.Array, chunks: Chunks, strain=None) -> jax.Array:
+def composite(table: jax.Array, anchors: jax.Array, pixels: jax.Array, chunks: Chunks) -> jax.Array:
     """`splat_table`, anchors (tiles, k), pixels (1 or tiles, k, p) relative to them -> image (tiles, v + 1, p): the
-    weighted values and, last, alpha. Differentiable in `table` only. `strain` (n + 1,) changes nothing; what stands for
-    its gradient is each splat's sum over pixels of the length of the gradient by its mean (AbsGS, Ye et al. 2024)."""
-    return _composite_forward(table, anchors, pixels, chunks, strain)[0]
+    weighted values and, last, alpha. Differentiable in `table` only."""
+    return _composite_forward(table, anchors, pixels, chunks)[0]
 
 
-def _composite_forward(table, anchors, pixels, chunks, strain):
+def _composite_forward(table, anchors, pixels, chunks):
     layers, tiles = _chunk_layers(table, anchors, pixels, chunks), anchors.shape[0]
     before = _before(layers[:, -1], chunks)
     layers = layers.at[:, -1].set(1.0 - layers[:, -1]) * before[:, None]
     image = jax.ops.segment_sum(layers, chunks.tile, num_segments=tiles + 1)[:tiles]
-    return image, (table, anchors, pixels, chunks, strain, before, layers, image)
+    return image, (table, anchors, pixels, chunks, before, layers, image)
 
 
 def _still_to_come(gradient, layers, image, chunks):
@@ -167,7 +166,7 @@ def _moments(power, planes):
 def _composite_backward(residuals, gradient):
     """d L / d alpha_i = T_i (value_i . g) - (sum_{j>i} w_j value_j . g) / (1 - alpha_i), with alpha's own
     channel counted as a value of 1. `rest` carries the sum still behind, this one included."""
-    table, anchors, pixels, chunks, strain, before, layers, image = residuals
+    table, anchors, pixels, chunks, before, layers, image = residuals
     rest = _still_to_come(gradient, layers, image, chunks)
     blocks, ones = _Blocks(chunks, anchors, pixels), jnp.ones(pixels.shape[2], table.dtype)
 
@@ -175,12 +174,12 @@ def _composite_backward(residuals, gradient):
         near, planes = blocks.by_tile(anchors, index), blocks.planes(index)
         pull = list(jnp.moveaxis(blocks.by_tile(gradient, index), 1, 0))
 
-        def turn(number, state):
-            through, rest, of_slots, lengths = state
+        def step(number, state):
+            through, rest, of_slots = state
             rows = blocks.rows(table, index, number)
             (of_terms, of_values), chain = jax.vjp(lambda x: _unpack(x, near), rows)
-            powers, weights, pulls = [], [], []
-            for u in range(blocks.turn):
+            powers, weights = [], []
+            for u in range(blocks.unroll):
                 raw, alpha = _alpha([c[u] for c in of_terms], planes)
                 weight = alpha * through
                 seen = sum((x[u][:, None] * g for x, g in zip(of_values, pull, strict=False)), pull[-1])
@@ -189,38 +188,30 @@ def _composite_backward(residuals, gradient):
                 # The cut and the clamp are flat: no gradient passes there.
                 powers.append(jnp.where((raw >= ALPHA_CUT) & (raw <= ALPHA_MAX), slope * raw, 0.0))
                 weights.append(weight)
-                if strain is not None:
-                    steepness = sum(s * s for s in slopes([c[u][:, None] for c in of_terms], planes))
-                    pulls.append(jnp.sum(jnp.abs(powers[-1]) * jnp.sqrt(steepness), axis=-1))
                 through = through - weight
             weights = jnp.stack(weights)
             sums = [jnp.matmul(weights * g, ones, precision="highest") for g in pull[:-1]]
             (of_rows,) = chain((_moments(jnp.stack(powers), planes), sums))
-            place = (number * blocks.turn, index * blocks.block, 0)
+            place = (number * blocks.unroll, index * blocks.block, 0)
             of_slots = jax.lax.dynamic_update_slice(of_slots, of_rows, place)
-            if strain is not None:
-                lengths = jax.lax.dynamic_update_slice(lengths, jnp.stack(pulls), place[:2])
-            return through, rest, of_slots, lengths
+            return through, rest, of_slots
 
-        start = (blocks.part(before, index), blocks.part(rest, index), *of_all)
-        return jax.lax.fori_loop(0, blocks.turns(index), turn, start)[2:]
+        start = (blocks.part(before, index), blocks.part(rest, index), of_all)
+        return jax.lax.fori_loop(0, blocks.steps(index), step, start)[2]
 
     start = jnp.zeros((*chunks.ids.shape, table.shape[1]), table.dtype)
-    start = (start, None if strain is None else start[..., 0])
-    of_slots, lengths = jax.lax.fori_loop(0, blocks.count, reverse_block, start)
-    of_strain = None if strain is None else jnp.zeros_like(strain).at[chunks.ids].add(lengths)
+    of_slots = jax.lax.fori_loop(0, blocks.count, reverse_block, start)
     # Rows are added in the order of the slots, one after the other on a CPU: the same bytes every time. A GPU adds
     # them atomically unless XLA_FLAGS has --xla_gpu_deterministic_ops=true.
-    return jnp.zeros_like(table).at[chunks.ids].add(of_slots), None, None, None, of_strain
+    return jnp.zeros_like(table).at[chunks.ids].add(of_slots), None, None, None
 
 
 composite.defvjp(_composite_forward, _composite_backward)
 
 
-def composite_chunks(splats: Splats, values, chunks: Chunks, camera: Camera, tile: int, strain=None) -> jax.Array:
-    """Splats with their values (n, v) and chunks -> (tiles, v + 1, tile^2): premultiplied values and, last, alpha.
-    `strain` (n + 1,) or None is `composite`'s."""
-    return composite(splat_table(splats, values), *tile_pixels(camera, tile), chunks, strain)
+def composite_chunks(splats: Splats, values, chunks: Chunks, camera: Camera, tile: int) -> jax.Array:
+    """Splats with their values (n, v) and chunks -> (tiles, v + 1, tile^2): premultiplied values and, last, alpha."""
+    return composite(splat_table(splats, values), *tile_pixels(camera, tile), chunks)
 
 
 def median_of_chunks(splats: Splats, chunks: Chunks, camera: Camera, tile: int) -> jax.Array:
@@ -233,17 +224,17 @@ def median_of_chunks(splats: Splats, chunks: Chunks, camera: Camera, tile: int) 
     def median_block(index, medians):
         near, planes = blocks.by_tile(anchors, index), blocks.planes(index)
 
-        def turn(number, state):
+        def step(number, state):
             through, median = state
             of_terms, (distance,) = _unpack(blocks.rows(table, index, number), near)
-            for u in range(blocks.turn):
+            for u in range(blocks.unroll):
                 behind = through * (1.0 - _alpha([c[u] for c in of_terms], planes)[1])
                 median = jnp.where((through > 0.5) & (behind <= 0.5), distance[u][:, None], median)
                 through = behind
             return through, median
 
         start = blocks.part(before, index)
-        median = jax.lax.fori_loop(0, blocks.turns(index), turn, (start, jnp.zeros_like(start)))[1]
+        median = jax.lax.fori_loop(0, blocks.steps(index), step, (start, jnp.zeros_like(start)))[1]
         return jax.lax.dynamic_update_slice_in_dim(medians, median, index * blocks.block, 0)
 
     medians = jax.lax.fori_loop(0, blocks.count, median_block, jnp.zeros_like(before))

@@ -4,31 +4,33 @@ import dataclasses
 
 from rein3d_jax.conventions import FAR, NEAR
 from rein3d_jax.errors import InputError
+from rein3d_jax.settings import Settings, setting
 
 
 @dataclasses.dataclass(frozen=True)
-class RasterizeConfig:
-    """The last four are buffer sizes: 0 means "measure them", which `allocate` and `render` do."""
+class RasterizeConfig(Settings):
+    """The rasterizer's picture and buffers. A buffer size of 0 means "measure it", which `allocate` and `render` do."""
 
-    antialias: bool = True  # scale opacity by what the screen-space filter spread out (Mip-Splatting, eq. 9)
-    distance: bool = True  # composite the distance too; without it a frame has none, and compositing is faster
-    filter_variance: float = 0.3  # pixels^2 added to every footprint (3DGS and gsplat)
-    near: float = NEAR  # metres
-    far: float = FAR  # metres
-    tile: int = 8  # pixels; 8 x 8 beats 16 x 16 for pixel-sized splats (design.md)
-    chunk: int = 32  # Gaussians composited before joining a tile's chunks
-    visible_capacity: int = 0  # Gaussians in view
-    row_capacity: int = 0  # (Gaussian, row of tiles) pairs
-    pair_capacity: int = 0  # (Gaussian, tile) pairs
-    chunk_capacity: int = 0  # chunks over all tiles
+    antialias: bool = setting(True, "scale opacity by what the screen-space filter spread out (Mip-Splatting, eq. 9)")
+    distance: bool = setting(True, "composite the distance too; without it a frame has none, and compositing is faster")
+    filter_variance: float = setting(
+        0.3, "added to every footprint (3DGS, gsplat): without it splats thinner than a pixel vanish",
+        within="(0, inf)", unit="pixels^2",
+    )  # fmt: skip
+    near: float = setting(NEAR, "distance below which nothing is drawn", within="(0, inf)", unit="metres")
+    far: float = setting(FAR, "distance beyond which nothing is drawn", within="(0, inf]", unit="metres")
+    # 8 x 8 beats 16 x 16 for pixel-sized splats.
+    tile: int = setting(8, "side of a tile; it must divide a panorama's width", within="[1, inf)", unit="pixels")
+    chunk: int = setting(32, "Gaussians composited before joining a tile's chunks", within="[1, inf)")
+    visible_capacity: int = setting(0, "Gaussians in view; 0: measured", within="[0, inf)")
+    row_capacity: int = setting(0, "(Gaussian, row of tiles) pairs; 0: measured", within="[0, inf)")
+    pair_capacity: int = setting(0, "(Gaussian, tile) pairs; 0: measured", within="[0, inf)")
+    chunk_capacity: int = setting(0, "chunks over all tiles; 0: measured", within="[0, inf)")
 
     def __post_init__(self):
-        if not 0 < self.near < self.far:
-            raise InputError(f"rasterize.near {self.near} must lie between 0 and rasterize.far {self.far}")
-        if self.tile < 1 or self.chunk < 1:
-            raise InputError("rasterize.tile and rasterize.chunk must be at least 1")
-        if self.filter_variance <= 0:
-            raise InputError("rasterize.filter_variance must be above 0: a splat thinner than a pixel would vanish")
+        super().__post_init__()
+        if self.near >= self.far:
+            raise InputError(f"near {self.near} must be below far {self.far}")
 
     @property
     def buffers(self) -> tuple[int, int, int, int]:

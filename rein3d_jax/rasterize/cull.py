@@ -8,7 +8,7 @@ from rein3d_jax.geometry.poses import invert
 from rein3d_jax.rasterize.config import RasterizeConfig
 from rein3d_jax.scene import Camera, Gaussians
 
-SUPPORT = 3.33  # sigmas to the 1/255 cut of an opaque splat: sqrt(2 ln 255)
+_SUPPORT = 3.33  # sigmas to the 1/255 cut of an opaque splat: sqrt(2 ln 255)
 
 
 def in_view(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig) -> jax.Array:
@@ -26,11 +26,11 @@ def in_view(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig) ->
     size = jnp.array([camera.width, camera.height], jnp.float32)
     # The filter reaches so many pixels; one more for rounding. EWA may stretch a splat near the edge by
     # its slope: the radius is measured against planes of unit normal times that stretch.
-    blur = SUPPORT * config.filter_variance**0.5 + 1.0
+    blur = _SUPPORT * config.filter_variance**0.5 + 1.0
     low = (-camera.centre - blur) / camera.focal
     high = (size - camera.centre + blur) / camera.focal
     stretch = 1.0 + 1.3 * jnp.max(jnp.maximum(jnp.abs(low), jnp.abs(high)))
-    radius = SUPPORT * sigma * stretch
+    radius = _SUPPORT * sigma * stretch
     inside = (x - low[0] * z > -radius) & (high[0] * z - x > -radius)
     inside &= (y - low[1] * z > -radius) & (high[1] * z - y > -radius)
     return gaussians.alive & inside & (z > config.near) & (z < config.far)

@@ -11,17 +11,17 @@ from rein3d_jax.scene import Camera, Gaussians
 
 
 def list_splats(
-    gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig, probe: jax.Array | None = None
+    gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig, means2d_offset: jax.Array | None = None
 ) -> tuple[Splats, Chunks, jax.Array, jax.Array]:
     """Splats (v,), their chunks, the Gaussian of each splat (v,) (n where none), and the buffer sizes needed (4,).
 
-    `probe` (n, 2) is `project`'s, one row a Gaussian.
+    `means2d_offset` (n, 2) is `project`'s, one row a Gaussian.
     """
     gaussians = at_least_one(gaussians)
     mask = in_view(jax.lax.stop_gradient(gaussians), camera, config=config)
     seen, ids = gather_in_view(gaussians, mask, config.visible_capacity)
-    if probe is not None:
-        probe = jnp.take(probe, ids, axis=0, mode="fill", fill_value=0.0)
-    splats = project(seen, camera, config=config, probe=probe)
+    if means2d_offset is not None:
+        means2d_offset = jnp.take(means2d_offset, ids, axis=0, mode="fill", fill_value=0.0)
+    splats = project(seen, camera, config=config, means2d_offset=means2d_offset)
     chunks = bin_splats(jax.lax.stop_gradient(splats), camera, config=config)
     return splats, chunks, ids, jnp.concatenate([jnp.sum(mask)[None], chunks.needed])

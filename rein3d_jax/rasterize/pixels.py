@@ -13,7 +13,7 @@ def grid(camera: Camera, tile: int) -> tuple[int, int]:
     return -(-camera.height // tile), -(-camera.width // tile)
 
 
-def features(camera: Camera) -> jax.Array:
+def pixel_features(camera: Camera) -> jax.Array:
     """(height, width, k): (u, v) of a pinhole camera's pixels, unit rays in camera axes of a panorama's."""
     if camera.model == EQUIRECTANGULAR:
         rays = pixel_rays(camera.height, camera.width)
@@ -23,8 +23,8 @@ def features(camera: Camera) -> jax.Array:
 
 
 def tile_pixels(camera: Camera, tile: int) -> tuple[jax.Array, jax.Array]:
-    """`features` as an anchor for each tile, (tiles, k), and the pixels' offsets from it, (tiles, k, tile^2); a flat
-    image's tiles all have the same, (1, k, tile^2). Pixels below the image repeat its last row."""
+    """`pixel_features` as an anchor for each tile, (tiles, k), and the pixels' offsets from it, (tiles, k, tile^2); a
+    flat image's tiles all have the same, (1, k, tile^2). Pixels below the image repeat its last row."""
     rows, columns = grid(camera, tile)
     if camera.model != EQUIRECTANGULAR:
         v, u = jnp.meshgrid(jnp.arange(rows) * tile, jnp.arange(columns) * tile, indexing="ij")

@@ -151,14 +151,16 @@ def _sphere_box(place, camera):
     return jnp.stack([u - du, v - dv, u + du, v + dv], axis=-1)
 
 
-def project(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig, probe: jax.Array | None = None) -> Splats:
+def project(
+    gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig, means2d_offset: jax.Array | None = None
+) -> Splats:
     """Gaussians in the world -> splats of `camera`.
 
     Culled (visible = False): dead slots, non-finite parameters, centres out of [near, far], opacity under
     the 1/255 cut, support off the image, and on the sphere sizes over MAX_ANGULAR_SIGMA.
 
-    `probe` (n, 2), zeros, is added to the whitened-plane position in pixels: its gradient is the 2D
-    positional gradient that densification reads (3DGS, Sec. 5.2).
+    `means2d_offset` (n, 2) pixels, zeros, is added to the projected means: its gradient is the means2d gradient that
+    densification reads (3DGS, Sec. 5.2). On the sphere a pixel is a row's pitch on the tangent plane.
     """
     count = gaussians.means.shape[0]
     assert gaussians.means.shape == (count, 3), gaussians.means.shape
@@ -191,17 +193,18 @@ def project(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig, pr
     visible = usable & in_range & on_image & (log_opacity > jnp.log(ALPHA_CUT))
     centre = camera.world_from_camera[:3, 3]
     direction = (clean.means - centre) / jnp.maximum(distance, 1e-12)[:, None]
-    if probe is not None:
-        mean = mean + _probe_shift(probe, points, distance, camera)
+    if means2d_offset is not None:
+        mean = mean + _feature_offset(means2d_offset, points, distance, camera)
     rgb = rgb_from_sh(clean.sh, direction)
     return Splats(mean, axes, log_opacity, rgb, distance, visible, support, box, place)
 
 
-def _probe_shift(probe, points, distance, camera):
+def _feature_offset(pixels, points, distance, camera):
+    """Offsets (n, 2) in pixels as offsets (n, k) of the camera's pixel features."""
     if camera.model != EQUIRECTANGULAR:
-        return probe
+        return pixels
     direction = jax.lax.stop_gradient(points / jnp.maximum(distance, 1e-12)[:, None])
-    return jnp.einsum("ni,nij->nj", probe, _tangent_frame(direction)) * (jnp.pi / camera.height)
+    return jnp.einsum("ni,nij->nj", pixels, _tangent_frame(direction)) * (jnp.pi / camera.height)
 
 
 def _finite(gaussians: Gaussians) -> jax.Array:

@@ -38,7 +38,7 @@ def coefficients(offset: list, axes: dict, log_opacity: jax.Array) -> list[jax.A
     return [constant, *first, *second]
 
 
-def evaluate(row: list, pixels: list) -> jax.Array:
+def evaluate_quadratic(row: list, pixels: list) -> jax.Array:
     """Coefficients `row` (terms(k) arrays) at the offsets `pixels` (k arrays): log alpha, in Horner's order."""
     k = len(pixels)
     inner = list(row[1 : 1 + k])
@@ -48,16 +48,6 @@ def evaluate(row: list, pixels: list) -> jax.Array:
     for x, slope in zip(pixels, inner, strict=True):
         total = total + x * slope
     return total
-
-
-def slopes(row: list, pixels: list) -> list[jax.Array]:
-    """Derivatives of `evaluate` by each of the k offsets; by the splat's mean they are the same with the other sign."""
-    k = len(pixels)
-    found = list(row[1 : 1 + k])
-    for (i, j), c in zip(second_order(k), row[1 + k :], strict=True):
-        found[i] = found[i] + c * pixels[j]
-        found[j] = found[j] + c * pixels[i]
-    return found
 
 
 def monomials(pixels: list) -> list[jax.Array]:

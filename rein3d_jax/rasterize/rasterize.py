@@ -46,23 +46,15 @@ class Frame:
 
 
 def _rasterize(
-    gaussians: Gaussians,
-    camera: Camera,
-    *,
-    config: RasterizeConfig,
-    probe: jax.Array | None = None,
-    strain: jax.Array | None = None,
-):
+    gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig, means2d_offset: jax.Array | None = None
+) -> Frame:
     if min(config.buffers) < 1:
         raise InputError("rasterize: buffer capacities are 0; call allocate(gaussians, cameras, config=config) first")
     if camera.model == EQUIRECTANGULAR and camera.width % config.tile:
         raise InputError(f"rasterize.tile {config.tile} does not divide the panorama's width {camera.width}")
-    splats, chunks, ids, needed = list_splats(gaussians, camera, config=config, probe=probe)
-    if strain is not None:
-        pixel = jnp.pi / camera.height if camera.model == EQUIRECTANGULAR else 1.0  # of the features that means are in
-        strain = jnp.append(jnp.take(strain, ids, mode="fill", fill_value=0.0) * pixel, 0.0)
+    splats, chunks, _, needed = list_splats(gaussians, camera, config=config, means2d_offset=means2d_offset)
     overflow = jnp.sum(jnp.maximum(needed - jnp.array(config.buffers), 0))
-    tiles = composite_chunks(splats, _values(splats, config), chunks, camera, config.tile, strain)
+    tiles = composite_chunks(splats, _values(splats, config), chunks, camera, config.tile)
     image = from_tiles(tiles, camera, config.tile)
     distance = safe_divide(image[..., 3], image[..., 4]) if config.distance else None
     return Frame(image[..., :3], image[..., -1], distance, needed, overflow)
@@ -76,9 +68,7 @@ def _values(splats: Splats, config: RasterizeConfig) -> jax.Array:
 rasterize = jax.jit(_rasterize, static_argnames=("config",))
 rasterize.__doc__ = """Gaussians, camera -> Frame. Pure; differentiable in every float of both.
 
-`config` must come from `allocate`; `probe` (n, 2) is `project`'s. `strain` (n,), zeros, changes nothing either: its
-gradient is the sum over pixels of the length of the 2D positional gradient, which does not cancel where pixels pull
-apart as the probe's does (AbsGS, Ye et al. 2024; their sum is of each axis alone, so it depends on a view's turn).
+`config` must come from `allocate`; `means2d_offset` (n, 2) is `project`'s: zeros that densification differentiates by.
 Check `frame.overflow == 0`, or call `render`, which grows the buffers itself. Raises InputError where buffers are unset
 or the tile does not divide a panorama's width. Deterministic: the same inputs give the same bytes on a CPU."""
 

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from rein3d_jax.conventions import ALPHA_CUT, ALPHA_MAX
 from rein3d_jax.rasterize.config import RasterizeConfig
-from rein3d_jax.rasterize.pixels import features
+from rein3d_jax.rasterize.pixels import pixel_features
 from rein3d_jax.rasterize.project import project
 from rein3d_jax.scene import Camera, Gaussians
 
@@ -19,7 +19,7 @@ def rasterize_reference(gaussians: Gaussians, camera: Camera, *, config: Rasteri
     splats = project(gaussians, camera, config=config)
     order = jnp.argsort(jnp.where(splats.visible, splats.distance, jnp.inf))
     splats = jax.tree.map(lambda x: x[order], splats)
-    offset = features(camera)[None] - splats.mean[:, None, None, :]
+    offset = pixel_features(camera)[None] - splats.mean[:, None, None, :]
     whitened = jnp.einsum("nij,nhwj->nhwi", splats.axes, offset, precision="highest")
     power = splats.log_opacity[:, None, None] - 0.5 * jnp.sum(whitened**2, axis=-1)
     raw = jnp.exp(jnp.where(splats.visible[:, None, None], power, -jnp.inf))

@@ -14,14 +14,14 @@ from rein3d_jax.rasterize.pixels import grid
 from rein3d_jax.rasterize.project import Splats
 from rein3d_jax.scene import Camera
 
-MARGIN = 0.01  # pixels
-TIP = 1e-3  # of a splat's reach
+_MARGIN = 0.01  # pixels
+_TIP = 1e-3  # of a splat's reach
 
 
 def tile_rows(splats: Splats, camera: Camera, *, config: RasterizeConfig) -> tuple[jax.Array, jax.Array]:
     """First row of tiles (n,) of each splat, and how many (n,): 0 where it is not visible."""
     rows, _ = grid(camera, config.tile)
-    first, count = _tiles(splats.box[:, 1] - MARGIN, splats.box[:, 3] + MARGIN, config.tile)
+    first, count = _tiles(splats.box[:, 1] - _MARGIN, splats.box[:, 3] + _MARGIN, config.tile)
     last = jnp.clip(first + count - 1, -1, rows - 1)
     first = jnp.clip(first, 0, rows)
     return first, jnp.where(splats.visible, jnp.maximum(last - first + 1, 0), 0)
@@ -58,11 +58,11 @@ def _pinhole_span(splats, ids, top, bottom):
     a, b, c = splats.axes[ids, 0, 0], splats.axes[ids, 0, 1], splats.axes[ids, 1, 1]
     s = splats.support[ids]
     height = s / c
-    low = jnp.maximum(top - mean_y - MARGIN, -height)
-    high = jnp.minimum(bottom - mean_y + MARGIN, height)
+    low = jnp.maximum(top - mean_y - _MARGIN, -height)
+    high = jnp.minimum(bottom - mean_y + _MARGIN, height)
     slant = jnp.hypot(b, c)
     tip = b * height / slant  # where x is least; it is greatest at -tip
-    margin = MARGIN + TIP * s * slant / (a * c)
+    margin = _MARGIN + _TIP * s * slant / (a * c)
 
     def reach(y, sign):
         return (sign * jnp.sqrt(jnp.maximum(s * s - (c * y) ** 2, 0.0)) - b * y) / a
@@ -79,7 +79,7 @@ def _sphere_span(splats, ids, top, bottom, camera):
     the cap holds a pole, at an end of the strip. Left and right end (r,) in pixels."""
     pitch = jnp.pi / camera.height
     azimuth, latitude = splats.place[ids, 0], splats.place[ids, 1]
-    angle = splats.place[ids, 2] * (1 + TIP) + MARGIN * pitch
+    angle = splats.place[ids, 2] * (1 + _TIP) + _MARGIN * pitch
     high, low = jnp.pi / 2 - top * pitch, jnp.pi / 2 - bottom * pitch
     widest = jnp.arcsin(jnp.clip(jnp.sin(latitude) / jnp.maximum(jnp.cos(angle), 1e-6), -1.0, 1.0))
 
@@ -91,4 +91,4 @@ def _sphere_span(splats, ids, top, bottom, camera):
     half = 2 * jnp.arcsin(jnp.sqrt(jnp.clip(most, 0.0, 1.0))) / (2 * jnp.pi) * camera.width
     u = (azimuth / (2 * jnp.pi) + 0.5) * camera.width
     none = most < 0
-    return jnp.where(none, 1.0, u - half - MARGIN), jnp.where(none, 0.0, u + half + MARGIN)
+    return jnp.where(none, 1.0, u - half - _MARGIN), jnp.where(none, 0.0, u + half + _MARGIN)

@@ -1,7 +1,7 @@
 """Splats -> chunks: which Gaussians, in depth order, each tile has to composite.
 
-Buffers have the capacities of the config; what did not fit is counted, never hidden (design.md, jax-md's
-allocate/update pattern). Nothing here is differentiated.
+Buffers have the capacities of the config; what did not fit is counted, never hidden (the allocate and update pattern of
+jax-md). Nothing here is differentiated.
 """
 
 import jax

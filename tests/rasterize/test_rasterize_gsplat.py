@@ -17,7 +17,7 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("gsplat")
 from gsplat.cuda import _torch_impl as oracle  # noqa: E402
 
-from benchmarks import engine_gsplat  # noqa: E402
+from benchmarks.engines import gsplat_torch  # noqa: E402
 from benchmarks.engines.ours import CONFIG, camera_of, scene_of  # noqa: E402
 from benchmarks.workloads import Size, make_workload  # noqa: E402
 
@@ -88,7 +88,7 @@ def test_picture_and_gradient_agree() -> None:
     gradient = jax.grad(loss, argnums=(0, 1, 2), has_aux=True)
     ours, image = gradient(scene.means, scene.log_scales, scene.quats)
     leaves = leaves_of(workload)
-    theirs = engine_gsplat.render(*leaves, workload.focal, SIZE.width, SIZE.height)
+    theirs = gsplat_torch.render(*leaves, workload.focal, SIZE.width, SIZE.height)
     assert float(theirs.detach().mean()) > 0.02
     # A pixel at which alpha rounds to the other side of the 1/255 cut may differ by as much.
     error = np.abs(np.asarray(image) - theirs.detach().numpy())

@@ -56,7 +56,7 @@ def close_to(actual: np.ndarray, expected: np.ndarray) -> None:
 
 @pytest.mark.parametrize("antialias", [True, False])
 def test_a_panorama_footprint_is_the_spread_of_directions(antialias) -> None:
-    """At the pole as on the horizon (failure-modes.md, row 1)."""
+    """At the pole as on the horizon: a plain EWA in longitude and latitude fails there."""
     across = 0.7 + np.arange(4)
     flat = np.cos(LATITUDES)
     directions = np.stack([flat * np.cos(across), flat * np.sin(across), np.sin(LATITUDES)], axis=-1)
@@ -86,3 +86,20 @@ def test_a_pinhole_footprint_is_the_spread_of_pixels() -> None:
     points = sampled_points(gaussians, camera.world_from_camera)
     pixels = jnp.stack(pixels_from_points(points, camera.focal, camera.centre), axis=-1)
     close_to(unfiltered(splats, 0.3), second_moments(pixels, np.asarray(splats.mean)))
+
+
+def test_offsets_move_projected_means_by_pixels_and_nothing_else() -> None:
+    """On the sphere by a row's pitch each, along the tangent plane."""
+    gaussians = splats_at(np.array([[1.0, 0, 0], [0.8, 0.0, -0.6], [0.8, 0.48, 0.36]]))
+    offsets = jnp.array([[3.0, 0.0], [0.0, -2.0], [1.5, 2.0]])
+    for camera in (pinhole_camera(upright(jnp.zeros(3)), 64, 2.0), equirectangular_camera(upright(jnp.zeros(3)), 64)):
+        before, after = (run(gaussians, camera, config=RasterizeConfig(), means2d_offset=x) for x in (0 * offsets, offsets))
+        moved = np.asarray(after.mean - before.mean)
+        if moved.shape[1] == 2:
+            np.testing.assert_allclose(moved, offsets, atol=1e-5)  # float32 pixels up to 64
+        else:
+            lengths = np.linalg.norm(offsets, axis=1) * np.pi / camera.height
+            np.testing.assert_allclose(np.linalg.norm(moved, axis=1), lengths, atol=1e-6)  # float32 unit rays
+            np.testing.assert_allclose(np.sum(moved * before.mean, axis=1), 0, atol=1e-6)
+        for a, b in zip(jax.tree.leaves(before.replace(mean=0)), jax.tree.leaves(after.replace(mean=0)), strict=True):
+            np.testing.assert_array_equal(a, b)

@@ -29,8 +29,9 @@ def test_value_and_gradient_equal_the_oracle(model, antialias, scene_of, camera_
     for name, value in expected.items():
         scale = float(jnp.abs(value).max())
         assert scale > 0.1, name  # the loss does depend on it
-        # The same, summed over 512 pixels with mixed signs, which cancel: relative to the leaf's largest.
-        np.testing.assert_allclose(gradient[name], value, atol=2e-5 * scale, err_msg=name)
+        # The same, summed over n = 512 pixels with random signs: sqrt(n) eps of the sum of magnitudes, which is about
+        # sqrt(n) times the leaf's largest; a splat left out would show all of it.
+        np.testing.assert_allclose(gradient[name], value, atol=1e-4 * scale, err_msg=name)
 
 
 @pytest.mark.parametrize("columns", [5, 16])  # no multiple of a tile, and half a turn
@@ -82,27 +83,3 @@ def test_value_and_gradient_lower_for_every_platform(model, scene_of, camera_of,
     both = jax.jit(lambda scene, camera: fast(scene, camera, config=roomy))
     exported = jax.export.export(both, platforms=platforms)(scene_of(), camera_of(model))
     assert exported.platforms == platforms
-
-
-@MODELS
-def test_strain_adds_up_what_each_pixel_pulls(model, scene_of, camera_of, roomy) -> None:
-    """Each pixel alone, by the probe; the strain is the sum of their lengths, and nothing of the picture changes."""
-    scene, camera = scene_of(), camera_of(model)
-    weights = jnp.asarray(np.random.default_rng(2).normal(size=(camera.height, camera.width, 3)), jnp.float32)
-
-    def pixels_of(probe):
-        return jnp.sum(weights * rasterize(scene, camera, config=roomy, probe=probe).rgb, axis=-1)
-
-    def loss(strain):
-        return jnp.sum(weights * rasterize(scene, camera, config=roomy, strain=strain).rgb)
-
-    count = scene.alive.shape[0]
-    by_pixel = jax.jit(jax.jacrev(pixels_of))(jnp.zeros((count, 2)))  # (h, w, n, 2)
-    expected = jnp.sum(jnp.linalg.norm(by_pixel, axis=-1), axis=(0, 1))
-    value, strain = jax.jit(jax.value_and_grad(loss))(jnp.zeros(count))
-    np.testing.assert_allclose(value, jnp.sum(pixels_of(jnp.zeros((count, 2)))), rtol=1e-6)
-    assert np.all(strain >= 0.99 * jnp.linalg.norm(jnp.sum(by_pixel, axis=(0, 1)), axis=-1))  # the triangle's law
-    # float32 sums over 512 pixels; on the sphere the chord's own pull, along the ray, is in the length but not in the
-    # probe: of second order in a splat's angle, which goes up to a third of a radian.
-    np.testing.assert_allclose(strain, expected, rtol=0.1 if model == EQUIRECTANGULAR else 1e-3, atol=1e-4)
-    assert float(strain.max()) > 0.1
