@@ -28,3 +28,5 @@ FAR = 100.0  # metres; the paper's far plane
 ALPHA_CUT = 1.0 / 255.0
 # Above this the transmittance behind a splat could reach 0, where its gradient is undefined (gsplat's value).
 ALPHA_MAX = 0.999
+
+EYE_HEIGHT = 1.6  # metres above the floor, where a camera stands in a room

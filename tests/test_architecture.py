@@ -41,7 +41,7 @@ HOMES = {
     "flax.linen": ("rein3d_jax/depth/", "rein3d_jax/restore/"),
     "optax": ("rein3d_jax/refine/", "experiments/"),
     "jaxopt": ("rein3d_jax/depth/",),
-    "cv2": ("rein3d_jax/io/", "rein3d_jax/restore/fills.py"),
+    "cv2": ("rein3d_jax/io/", "rein3d_jax/meshes/", "rein3d_jax/restore/fills.py"),
     "OpenImageIO": ("rein3d_jax/io/pictures/",),
     "av": ("rein3d_jax/io/pictures/video.py",),
     "orbax": ("rein3d_jax/io/files/",),

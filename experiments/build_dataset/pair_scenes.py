@@ -10,8 +10,9 @@ import numpy as np
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.meshes.front3d import read_front, room_names
-from rein3d_jax.meshes.mesh_scene import MeshScene, read_mesh_scene
-from rein3d_jax.meshes.standing_point import standing_point
+from rein3d_jax.io.meshes.mesh_file import read_mesh_scene
+from rein3d_jax.meshes.camera_place import find_camera_place
+from rein3d_jax.meshes.mesh_scene import MeshScene
 from rein3d_jax.pipeline.pairs import Drawn, PairConfig, make_pair, scene_pair
 
 MESHES = (".glb", ".gltf", ".obj")
@@ -69,7 +70,7 @@ def _standing(place: tuple[Path, str | None], scenes: SceneConfig) -> Callable:
         scene = read_mesh_scene(path, up=scenes.up, scale=scenes.scale)
     else:
         scene = read_front(path, scenes.models, textures=scenes.textures, room=room)
-    return partial(_look, scene.at(standing_point(scene).eye))
+    return partial(_look, scene.at(find_camera_place(scene).eye))
 
 
 def _look(scene: MeshScene, pose: jax.Array, rows: int) -> tuple[np.ndarray, np.ndarray]:

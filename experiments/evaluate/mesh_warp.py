@@ -8,30 +8,30 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from experiments.evaluate.look import Shown
+from experiments.evaluate.renderer import Rendering
 from rein3d_jax.conventions import EQUIRECTANGULAR
 from rein3d_jax.geometry.pinhole import pinhole_rays
 from rein3d_jax.geometry.resample import sample_sphere
-from rein3d_jax.geometry.sphere import pixels_from_rays
-from rein3d_jax.io.rooms.posed_panorama import pose_of_turn, rays_of_pose
+from rein3d_jax.geometry.sphere import pixels_from_rays, rays_of_pose64
+from rein3d_jax.io.rooms.posed_panorama import panorama_pose
 from rein3d_jax.meshes.ray_caster import RayCaster
 from rein3d_jax.scene import Camera, Panorama
 
-JUMP = 0.05  # change of inverse distance, as a share of the larger, beyond its surfaces' own slope, that cuts a link
-PEAK = 3  # links; a slope that goes on for as many is a surface's own, a narrower one is a jump
-SAMPLES = 2  # rays a pixel and side
+_JUMP = 0.05  # change of inverse distance, as a share of the larger, beyond its surfaces' own slope, that cuts a link
+_PEAK = 3  # links; a slope that goes on for as many is a surface's own, a narrower one is a jump
+_SAMPLES = 2  # rays a pixel and side
 
 
 @dataclass(frozen=True)
 class MeshWarp:
-    """A panorama's mesh, to be looked at from anywhere. Call it as `look.Look`."""
+    """A panorama's mesh, to be rendered from anywhere: a `Renderer`."""
 
     rgb: jax.Array  # (h, w, 3) sRGB, the texture
     caster: RayCaster
     triangles: int
 
-    def __call__(self, camera: Camera) -> Shown:
-        """What `camera` sees, each pixel the mean of SAMPLES^2 rays."""
+    def __call__(self, camera: Camera) -> Rendering:
+        """What `camera` sees, each pixel the mean of _SAMPLES^2 rays."""
         eye = np.asarray(camera.world_from_camera, np.float64)[:3, 3]
         rays = _rays(camera)
         hits = self.caster.cast(eye, rays.reshape(-1, 3))
@@ -41,7 +41,7 @@ class MeshWarp:
         distance = jnp.asarray(hits.distance.reshape(rays.shape[:2]), jnp.float32)
         alpha = _mean(hit)
         share = jnp.where(alpha > 0, alpha, 1.0)
-        return Shown(_mean(colour * hit[..., None]) / share[..., None], alpha, _mean(distance) / share)
+        return Rendering(_mean(colour * hit[..., None]) / share[..., None], alpha, _mean(distance) / share)
 
 
 def mesh_warp(panorama: Panorama) -> MeshWarp:
@@ -57,7 +57,7 @@ def mesh_of(distance: np.ndarray) -> np.ndarray:
     seam and by a fan at each pole; none across a cut link."""
     known = distance > 0
     inverse = np.where(known, 1 / np.where(known, distance, 1.0), 0.0)
-    points = rays_of_pose(pose_of_turn(np.eye(3), np.zeros(3)), len(distance)) * distance[..., None]
+    points = rays_of_pose64(panorama_pose(np.eye(3), np.zeros(3)), len(distance)) * distance[..., None]
     across = _links(np.concatenate([inverse, inverse[:, :1]], axis=1), "wrap")  # (i, j) to (i, j + 1)
     down = _links(inverse.T, "edge").T  # (i, j) to (i + 1, j)
     right = np.roll(points, -1, axis=1)
@@ -74,11 +74,11 @@ def _links(inverse: np.ndarray, beyond: str) -> np.ndarray:
     A grey opening of the slope takes jumps away and leaves what goes on; an unknown neighbour is no reason to cut."""
     one, other = inverse[:, :-1], inverse[:, 1:]
     known = (one > 0) & (other > 0)
-    slope = np.pad(np.where(known, np.abs(other - one), np.inf), ((0, 0), (PEAK - 1, PEAK - 1)), mode=beyond)
-    least = sliding_window_view(slope, PEAK, axis=1).min(axis=-1)
-    own = sliding_window_view(least, PEAK, axis=1).max(axis=-1)
+    slope = np.pad(np.where(known, np.abs(other - one), np.inf), ((0, 0), (_PEAK - 1, _PEAK - 1)), mode=beyond)
+    least = sliding_window_view(slope, _PEAK, axis=1).min(axis=-1)
+    own = sliding_window_view(least, _PEAK, axis=1).max(axis=-1)
     jump = np.where(known, np.abs(other - one), 0.0) - np.where(known, own, 0.0)
-    return known & (jump <= JUMP * np.maximum(one, other))
+    return known & (jump <= _JUMP * np.maximum(one, other))
 
 
 def _fan(row: np.ndarray, right: np.ndarray, whole: np.ndarray, up: float) -> np.ndarray:
@@ -89,12 +89,12 @@ def _fan(row: np.ndarray, right: np.ndarray, whole: np.ndarray, up: float) -> np
 
 
 def _rays(camera: Camera) -> np.ndarray:
-    """(SAMPLES h, SAMPLES w, 3) unit rays in the world, float64."""
+    """(_SAMPLES h, _SAMPLES w, 3) unit rays in the world, float64."""
     pose = np.asarray(camera.world_from_camera, np.float64)
     if camera.model == EQUIRECTANGULAR:
-        return rays_of_pose(pose, SAMPLES * camera.height)
-    size = (SAMPLES * camera.height, SAMPLES * camera.width)
-    rays = np.asarray(pinhole_rays(*size, SAMPLES * camera.focal, SAMPLES * camera.centre), np.float64) @ pose[:3, :3].T
+        return rays_of_pose64(pose, _SAMPLES * camera.height)
+    size = (_SAMPLES * camera.height, _SAMPLES * camera.width)
+    rays = np.asarray(pinhole_rays(*size, _SAMPLES * camera.focal, _SAMPLES * camera.centre), np.float64) @ pose[:3, :3].T
     return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
 
 
@@ -104,6 +104,6 @@ def _texture(rgb: jax.Array, points: jax.Array) -> jax.Array:
 
 
 def _mean(image: jax.Array) -> jax.Array:
-    """(SAMPLES h, SAMPLES w, ...) -> (h, w, ...)."""
-    height, width = (size // SAMPLES for size in image.shape[:2])
-    return image.reshape(height, SAMPLES, width, SAMPLES, *image.shape[2:]).mean(axis=(1, 3))
+    """(_SAMPLES h, _SAMPLES w, ...) -> (h, w, ...)."""
+    height, width = (size // _SAMPLES for size in image.shape[:2])
+    return image.reshape(height, _SAMPLES, width, _SAMPLES, *image.shape[2:]).mean(axis=(1, 3))

@@ -2,7 +2,7 @@
 
 Light is not simulated: a surface shows its base colour times AMBIENT + DIRECTED (1 + n . l) / 2, in sRGB, with one
 fixed l and n the flat normal of the side that is seen. Walls, floor and ceiling differ, nothing casts a shadow, and a
-surface looks alike from everywhere, which pairs of clean and degraded frames need.
+surface has one colour from everywhere, which pairs of clean and degraded frames need.
 """
 
 from dataclasses import dataclass, replace
@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rein3d_jax.io.meshes.mesh_file import read_mesh
-from rein3d_jax.io.rooms.posed_panorama import rays_of_pose
+from rein3d_jax.geometry.sphere import rays_of_pose64
 from rein3d_jax.meshes.ray_caster import Hits, RayCaster
-from rein3d_jax.meshes.texture import look_up
+from rein3d_jax.meshes.texture import sample_texture
 from rein3d_jax.meshes.triangles import Triangles
 
 AMBIENT, DIRECTED = 0.6, 0.4
@@ -52,7 +51,7 @@ class MeshScene:
         where nothing is hit; float32. `samples` is odd, so that one of them is the centre."""
         assert samples % 2 == 1 and world_from_camera.shape == (4, 4), (samples, world_from_camera.shape)
         rows = height * samples
-        rays = rays_of_pose(world_from_camera, rows).reshape(-1, 3)
+        rays = rays_of_pose64(world_from_camera, rows).reshape(-1, 3)
         eye = np.asarray(world_from_camera, np.float64)[:3, 3]
         colour, distance = np.empty((len(rays), 3), np.float32), np.empty(len(rays), np.float32)
         for start in range(0, len(rays), _STRIP):
@@ -83,10 +82,10 @@ class MeshScene:
                 here = np.flatnonzero(self.soup.textured[face] == index)
                 picture, corners = self.soup.textures[index], self.soup.uv[face[here]].astype(np.float64)
                 texels = _area_2d(corners) * picture.texels
-                with np.errstate(divide="ignore"):  # a face of one texel has level -inf: the finest
+                with np.errstate(divide="ignore"):  # a face of one texel has level -inf: the full picture
                     level = np.log2(side[here] * np.sqrt(texels / area[here]))
                 places = (self._barycentric(face[here], point[here])[..., None] * corners).sum(1)
-                colour[here] = look_up(picture, places, level)
+                colour[here] = sample_texture(picture, places, level)
         return colour
 
     def _barycentric(self, face: np.ndarray, point: np.ndarray) -> np.ndarray:
@@ -103,11 +102,6 @@ class MeshScene:
 def mesh_scene(path: str | Path, soup: Triangles, missing: tuple[str, ...] = ()) -> MeshScene:
     """The soup that was read from `path`, ready to be traced. Raises InputError without embreex."""
     return MeshScene(str(path), soup, RayCaster(soup.corners), np.zeros(3), missing)
-
-
-def read_mesh_scene(path: str | Path, *, up: str = "y", scale: float = 1.0) -> MeshScene:
-    """A glTF, GLB or OBJ file as a scene; its own origin is the world's. Options and errors as io/mesh_file.py's."""
-    return mesh_scene(path, read_mesh(path, up=up, scale=scale))
 
 
 def _area_2d(corners: np.ndarray) -> np.ndarray:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.meshes.mesh_file import MEND
 from rein3d_jax.meshes.triangles import plane_normals
 
 
@@ -26,7 +25,7 @@ class RayCaster:
             from embreex.mesh_construction import TriangleMesh
             from embreex.rtcore_scene import EmbreeScene
         except ImportError as error:
-            raise InputError(f"tracing meshes needs embreex: {MEND}") from error
+            raise InputError("tracing meshes needs embreex: pip install 'rein3d-jax[data]'") from error
         self.normal, self.area = plane_normals(corners)  # (n, 3) unit, (n,)
         self.anchor = corners[:, 0]  # a point on each plane
         self.bounds = np.stack([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])  # (2, 3)

@@ -28,7 +28,7 @@ def texture(picture: np.ndarray) -> Texture:
     return Texture(tuple(levels))
 
 
-def look_up(picture: Texture, uv: np.ndarray, level: np.ndarray) -> np.ndarray:
+def sample_texture(picture: Texture, uv: np.ndarray, level: np.ndarray) -> np.ndarray:
     """Colours (n, 3) in [0, 1] at `uv` (n, 2), read at `level` (n,) = log2 of the texels that a pixel's side covers:
     bilinear in the picture, linear between two halvings (Williams 1983)."""
     level = np.clip(level, 0, len(picture.levels) - 1)

@@ -47,8 +47,8 @@ def triangles(
     return Triangles(corners, places, colours, index, (picture,) if wraps else ())
 
 
-def joined(parts: list[Triangles], path: Path) -> Triangles:
-    """All parts as one, without triangles that have no area; a texture that several share is kept once. Raises
+def join_triangles(parts: list[Triangles], path: Path) -> Triangles:
+    """All parts as one, without triangles that have no area; a texture that several share is stored once. Raises
     InputError, naming `path`, for more than MAX_TRIANGLES and for none."""
     parts = [_with_area(part) for part in parts]
     total = sum(len(part.corners) for part in parts)
@@ -63,7 +63,7 @@ def joined(parts: list[Triangles], path: Path) -> Triangles:
     return Triangles(*fields, np.concatenate(textured), tuple(textures))
 
 
-def moved(soup: Triangles, pose: np.ndarray) -> Triangles:
+def transformed(soup: Triangles, pose: np.ndarray) -> Triangles:
     """The soup under an affine map (4, 4)."""
     return replace(soup, corners=soup.corners @ pose[:3, :3].T + pose[:3, 3])
 
@@ -83,9 +83,9 @@ def plane_normals(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _with_area(part: Triangles) -> Triangles:
     with np.errstate(divide="ignore", invalid="ignore"):
         _, area = plane_normals(part.corners)
-    kept = area > _THINNEST
-    fields = {name: getattr(part, name)[kept] for name in ("corners", "uv", "colour", "textured")}
-    return part if kept.all() else replace(part, **fields)
+    thick = area > _THINNEST
+    fields = {name: getattr(part, name)[thick] for name in ("corners", "uv", "colour", "textured")}
+    return part if thick.all() else replace(part, **fields)
 
 
 def _renumbered(part: Triangles, place: dict[int, int]) -> np.ndarray:

@@ -8,9 +8,9 @@ import pytest
 
 from experiments.reconstruct.inputs import SAMPLES
 from rein3d_jax.geometry.poses import pinhole_camera, upright
+from rein3d_jax.geometry.sphere import WORLD_FROM_CAMERA_AXES, rays_of_pose64
 from rein3d_jax.io.pictures.distance import write_distance_exr
 from rein3d_jax.io.pictures.image import write_rgb
-from rein3d_jax.io.rooms.posed_panorama import UNTURNED, rays_of_pose
 
 WALLS = np.array([3.0, 2.5, 1.4])  # half sizes, metres; the input stands in the middle
 CHEST = np.array([[1.0, -0.6, -1.4], [1.6, 0.5, 0.2]])  # two opposite corners
@@ -57,7 +57,7 @@ def write_room(folder):
 
     def panorama(name, eye, height, depth=True):
         pose = np.asarray(upright(np.asarray(eye)), np.float64)
-        rgb, distance = seen(eye, rays_of_pose(pose, height))
+        rgb, distance = seen(eye, rays_of_pose64(pose, height))
         write_rgb(folder / f"{name}.png", rgb)
         if depth:
             write_distance_exr(folder / f"{name}_distance.exr", distance)
@@ -120,13 +120,15 @@ def room_seen():
 def turned_pose():
     """world_from_camera (4, 4) of an unturned panorama at the origin."""
     pose = np.eye(4)
-    pose[:3, :3] = UNTURNED
+    pose[:3, :3] = WORLD_FROM_CAMERA_AXES
     return pose
 
 
 @pytest.fixture(scope="session")
 def run_folder(rooms, tmp_path_factory):
     """A run's folder, written from the room's truth: its restored videos are exact, its scene is the lifted input."""
+    from rein3d_jax.pipeline.pipeline import Restored, lift_scene
+
     from experiments.config import config_from, dump_config
     from experiments.reconstruct.__main__ import ReconstructConfig
     from experiments.reconstruct.inputs import read_panorama
@@ -134,7 +136,6 @@ def run_folder(rooms, tmp_path_factory):
     from rein3d_jax.geometry.sphere import rays_of_pose as rays_at
     from rein3d_jax.io.files.checkpoint import save
     from rein3d_jax.io.splats.ply import write_ply
-    from rein3d_jax.pipeline.pipeline import Restored, lift_scene
     from rein3d_jax.scene import Video
 
     folder, room = tmp_path_factory.mktemp("run") / "room", rooms / "room2"

@@ -11,9 +11,10 @@ import trimesh
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.poses import upright
-from rein3d_jax.io.rooms.posed_panorama import rays_of_pose
-from rein3d_jax.meshes.mesh_scene import AMBIENT, DIRECTED, SKY, mesh_scene, read_mesh_scene
-from rein3d_jax.meshes.standing_point import floor_height, standing_point
+from rein3d_jax.geometry.sphere import rays_of_pose64
+from rein3d_jax.io.meshes.mesh_file import read_mesh_scene
+from rein3d_jax.meshes.camera_place import find_camera_place, floor_height
+from rein3d_jax.meshes.mesh_scene import AMBIENT, DIRECTED, SKY, mesh_scene
 from rein3d_jax.meshes.texture import texture
 from rein3d_jax.meshes.triangles import triangles
 
@@ -56,14 +57,14 @@ def test_distance_of_a_box_is_exact(tmp_path, name):
         rgb, distance = scene.trace(pose, 32)
         assert rgb.shape == (32, 64, 3) and rgb.dtype == distance.dtype == np.float32
         # The issue asks for 1e-4 m; float32 vertices of 3 m leave 2e-7, the pose's float32 rotation as much a metre.
-        np.testing.assert_allclose(distance, box_distance(pose[:3, 3], rays_of_pose(pose, 32)), atol=2e-6)
+        np.testing.assert_allclose(distance, box_distance(pose[:3, 3], rays_of_pose64(pose, 32)), atol=2e-6)
 
 
 def test_far_from_the_file_s_origin_and_in_other_units(tmp_path):
     shift = np.array([4000.0, -2500.0, 300.0])
     soup = read_mesh_scene(write(tmp_path / "a.glb", box(LOW, HIGH))).soup
     far = mesh_scene("far", dataclasses.replace(soup, corners=soup.corners + shift)).at(shift + EYE)
-    rays = rays_of_pose(upright(np.zeros(3)), 16)
+    rays = rays_of_pose64(upright(np.zeros(3)), 16)
     distance = far.trace(np.asarray(upright(np.zeros(3)), np.float64), 16)[1]
     np.testing.assert_allclose(distance, box_distance(EYE, rays), atol=1e-6)  # vertices of 2.5 m in float32
     centimetres = read_mesh_scene(write(tmp_path / "b.glb", box(100 * LOW, 100 * HIGH)), scale=0.01)
@@ -146,21 +147,21 @@ def test_a_place_to_stand(tmp_path):
     """Beside a table that fills half of the room, the farthest place is in the middle of the other half."""
     table = box([-2.0, 0.0, 0.0], [2.5, 3.0, 0.8], BLUE)
     scene = read_mesh_scene(write(tmp_path / "room.glb", box(LOW, HIGH), table))
-    place = standing_point(scene)
+    place = find_camera_place(scene)
     assert floor_height(scene) == pytest.approx(0.0, abs=1e-6) and place.eye[2] == pytest.approx(1.6, abs=1e-6)
     assert place.eye[1] == pytest.approx(-1.5, abs=0.1) and place.clearance == pytest.approx(1.5, abs=0.1)  # the grid
-    np.testing.assert_array_equal(standing_point(scene).eye, place.eye)
-    moved = standing_point(scene.at([1.0, 2.0, 3.0]))
+    np.testing.assert_array_equal(find_camera_place(scene).eye, place.eye)
+    moved = find_camera_place(scene.at([1.0, 2.0, 3.0]))
     np.testing.assert_allclose(moved.eye, place.eye - [1.0, 2.0, 3.0], atol=1e-6)
 
 
 def test_nowhere_to_stand(tmp_path):
     low = read_mesh_scene(write(tmp_path / "low.glb", box(LOW, [2.5, 3.0, 1.5])))
     with pytest.raises(InputError, match=r"low.glb has no place to stand, 1.6 m above 0.00"):
-        standing_point(low)
+        find_camera_place(low)
     wall = read_mesh_scene(quad(tmp_path / "wall.obj", np.zeros((4, 4, 3), np.uint8)), up="z")
     with pytest.raises(InputError, match=r"wall.obj has no level surface"):
-        standing_point(wall)
+        find_camera_place(wall)
 
 
 @pytest.mark.parametrize("lacking", ["trimesh", "PIL.Image", "embreex.mesh_construction"])

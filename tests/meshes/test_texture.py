@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rein3d_jax.meshes.texture import look_up, texture
+from rein3d_jax.meshes.texture import sample_texture, texture
 
 RNG = np.random.default_rng(0)
 PICTURE = RNG.integers(0, 256, (8, 16, 3)).astype(np.uint8)
@@ -18,20 +18,20 @@ def test_texel_centres_are_exact_and_the_picture_repeats():
     uv = centres(8, 16)
     expected = PICTURE.reshape(-1, 3) / 255
     for shift in ((0, 0), (1, 0), (-3, 2)):
-        colour = look_up(texture(PICTURE), uv + shift, np.zeros(len(uv)))
+        colour = sample_texture(texture(PICTURE), uv + shift, np.zeros(len(uv)))
         np.testing.assert_allclose(colour, expected, atol=1e-12)  # float64
     level = np.full(len(uv), -np.inf)  # a footprint of no size
-    np.testing.assert_allclose(look_up(texture(PICTURE), uv, level), expected, atol=1e-12)
+    np.testing.assert_allclose(sample_texture(texture(PICTURE), uv, level), expected, atol=1e-12)
 
 
 def test_one_colour_stays_itself_everywhere():
     uv, level = 5 * RNG.standard_normal((200, 2)), RNG.uniform(-3, 12, 200)
     plain = np.full((5, 7, 3), (10, 200, 90), np.uint8)
-    np.testing.assert_allclose(look_up(texture(plain), uv, level), np.tile(plain[0, 0] / 255, (200, 1)), atol=1e-12)
+    np.testing.assert_allclose(sample_texture(texture(plain), uv, level), np.tile(plain[0, 0] / 255, (200, 1)), atol=1e-12)
 
 
 def test_large_footprints_read_the_mean():
-    colour = look_up(texture(PICTURE), RNG.random((50, 2)), np.full(50, 20.0))
+    colour = sample_texture(texture(PICTURE), RNG.random((50, 2)), np.full(50, 20.0))
     # Every halving rounds to bytes once, half a byte at most.
     np.testing.assert_allclose(colour, np.tile(PICTURE.mean((0, 1)) / 255, (50, 1)), atol=4 * 0.5 / 255)
 
@@ -39,5 +39,5 @@ def test_large_footprints_read_the_mean():
 def test_levels_blend_without_a_step():
     uv = np.tile(RNG.random(2), (2, 1))
     for level in (1.0, 2.0):
-        below, above = look_up(texture(PICTURE), uv, np.array([level - 1e-9, level + 1e-9]))
+        below, above = sample_texture(texture(PICTURE), uv, np.array([level - 1e-9, level + 1e-9]))
         np.testing.assert_allclose(below, above, atol=1e-7)  # the slope of a level times 2e-9

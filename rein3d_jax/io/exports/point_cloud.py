@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from rein3d_jax.geometry.spherical_harmonics import C0
 from rein3d_jax.io.files.atomic import write_bytes
 from rein3d_jax.io.pictures.image import to_uint8
 from rein3d_jax.scene import Gaussians
 
-_SH_C0 = 0.28209479177387814  # the constant spherical harmonic
 _ROW = np.dtype([(axis, "<f4") for axis in "xyz"] + [(name, "u1") for name in ("red", "green", "blue")])
 
 
@@ -26,7 +26,7 @@ def points_of(gaussians: Gaussians, most: int) -> Points:
     `most`; their colours without what depends on the view."""
     chosen = np.flatnonzero(np.asarray(gaussians.alive) & (np.asarray(gaussians.opacity_logits) > 0))
     chosen = chosen[np.linspace(0, len(chosen) - 1, min(most, len(chosen))).astype(int)]
-    colours = 0.5 + _SH_C0 * np.asarray(gaussians.sh)[chosen, 0]
+    colours = 0.5 + C0 * np.asarray(gaussians.sh)[chosen, 0]
     return Points(np.asarray(gaussians.means, np.float64)[chosen], to_uint8(colours))
 
 

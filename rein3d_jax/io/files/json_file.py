@@ -7,14 +7,14 @@ from typing import Any
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.input_file import require_file
 
-MAX_BYTES = 512 * 2**20  # a parsed file takes several times its size
+_MAX_BYTES = 512 * 2**20  # a parsed file takes several times its size
 
 
 def read_json(path: Path) -> Any:
-    """What `path` holds. Raises InputError if it is missing, larger than MAX_BYTES, or no JSON."""
+    """What `path` holds. Raises InputError if it is missing, larger than _MAX_BYTES, or no JSON."""
     require_file(path)
-    if (size := path.stat().st_size) > MAX_BYTES:
-        raise InputError(f"{path} has {size} bytes, more than {MAX_BYTES}: give the scene's own JSON file")
+    if (size := path.stat().st_size) > _MAX_BYTES:
+        raise InputError(f"{path} has {size} bytes, more than {_MAX_BYTES}: give the scene's own JSON file")
     try:
         return json.loads(path.read_bytes())
     except (ValueError, RecursionError) as error:  # UnicodeDecodeError is a ValueError
@@ -22,8 +22,8 @@ def read_json(path: Path) -> Any:
         raise InputError(f"{path} is no JSON ({reason}): copy or export it again") from error
 
 
-def inside(folder: Path, name: str, *, named_by: Path) -> Path:
-    """The file `name` of `folder`. Raises InputError, naming `named_by`, unless it stays inside: no absolute path,
+def path_within(folder: Path, name: str, *, named_by: Path) -> Path:
+    """The file `name` of `folder`. Raises InputError, naming `named_by`, unless it stays path_within: no absolute path,
     no "..", no link that leads out, no address."""
     try:
         stays = "://" not in name and (folder / name).resolve().is_relative_to(folder.resolve())

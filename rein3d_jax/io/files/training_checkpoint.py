@@ -10,16 +10,16 @@ from orbax.checkpoint.checkpoint_managers import AnyPreservationPolicy, BestN, L
 
 from rein3d_jax.errors import InputError
 
-SCORE = "score"
+_SCORE = "score"
 
 
 class TrainingCheckpoints:
     """States by step in one folder. A context manager: leaving it waits for what is still being written."""
 
     def __init__(self, folder: str | Path):
-        keep = AnyPreservationPolicy([LatestN(1), BestN(get_metric_fn=lambda m: m[SCORE], n=1)])
+        keep = AnyPreservationPolicy([LatestN(1), BestN(get_metric_fn=lambda m: m[_SCORE], n=1)])
         options = ocp.CheckpointManagerOptions(
-            preservation_policy=keep, best_fn=lambda metrics: metrics[SCORE], enable_async_checkpointing=True
+            preservation_policy=keep, best_fn=lambda metrics: metrics[_SCORE], enable_async_checkpointing=True
         )
         self.folder = Path(folder).absolute()
         self.manager = ocp.CheckpointManager(self.folder, options=options)
@@ -33,7 +33,7 @@ class TrainingCheckpoints:
 
     def save(self, step: int, state: Any, score: float) -> None:
         """Starts writing `state`, a pytree of arrays; `score` decides which is best: the greatest."""
-        self.manager.save(step, args=ocp.args.StandardSave(state), metrics={SCORE: float(score)})
+        self.manager.save(step, args=ocp.args.StandardSave(state), metrics={_SCORE: float(score)})
 
     def last(self) -> int | None:
         """The step of the newest whole checkpoint."""
@@ -46,7 +46,7 @@ class TrainingCheckpoints:
     def best_score(self) -> float:
         """Its score; -inf where there is none."""
         best = self.best()
-        return -float("inf") if best is None else float(self.manager.metrics(best)[SCORE])
+        return -float("inf") if best is None else float(self.manager.metrics(best)[_SCORE])
 
     def restore(self, step: int, like: Any) -> Any:
         """The state saved at `step`, laid over devices as `like` is. Raises InputError if it does not fit."""

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.files.json_file import inside, read_json
+from rein3d_jax.io.files.json_file import path_within, read_json
 from rein3d_jax.io.meshes.mesh_file import read_mesh
 from rein3d_jax.io.pictures.image import read_rgb, to_uint8
 from rein3d_jax.meshes.mesh_scene import MeshScene, mesh_scene
 from rein3d_jax.meshes.texture import Texture, texture
-from rein3d_jax.meshes.triangles import Triangles, joined, moved, triangles, z_up
+from rein3d_jax.meshes.triangles import Triangles, join_triangles, transformed, triangles, z_up
 
 _UNPAINTED = (220, 220, 220)  # 3D-FRONT-ToolBox's default
 
@@ -55,7 +55,7 @@ def read_front(
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
         reason = " ".join(repr(error).split())
         raise InputError(f"{path} is no house of 3D-FRONT ({reason}): copy it again") from error
-    return mesh_scene(path, z_up(joined(parts, path)), tuple(sorted(house.missing)))
+    return mesh_scene(path, z_up(join_triangles(parts, path)), tuple(sorted(house.missing)))
 
 
 class _House:
@@ -79,7 +79,7 @@ class _House:
                 mesh = meshes[child["ref"]]
                 parts.append(self._mesh(mesh, materials.get(mesh.get("material"))))
             elif child["ref"] in furniture and (model := self._model(furniture[child["ref"]])) is not None:
-                parts.append(moved(model, _place(child)))
+                parts.append(transformed(model, _place(child)))
         return parts
 
     def _children(self, room: str | None) -> list[dict[str, Any]]:
@@ -110,7 +110,8 @@ class _House:
         if not material.get("texture") or not jid:
             return None
         if jid not in self._pictures:
-            file = None if self.textures is None else inside(self.textures, f"{jid}/texture.png", named_by=self.path)
+            name, folder = f"{jid}/texture.png", self.textures
+            file = None if folder is None else path_within(folder, name, named_by=self.path)
             self._pictures[jid] = _read_texture(file) if file is not None and file.is_file() else None
             if self._pictures[jid] is None:
                 self.missing.add(f"texture {jid}")
@@ -118,7 +119,7 @@ class _House:
 
     def _model(self, jid: str) -> Triangles | None:
         if jid not in self._models:
-            file = inside(self.models, f"{jid}/raw_model.obj", named_by=self.path)
+            file = path_within(self.models, f"{jid}/raw_model.obj", named_by=self.path)
             self._models[jid] = read_mesh(file, up="z") if file.is_file() else None  # Y up stays till the end
             if self._models[jid] is None:
                 self.missing.add(f"model {jid}")

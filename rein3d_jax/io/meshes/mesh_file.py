@@ -8,17 +8,18 @@ from types import ModuleType
 import numpy as np
 
 from rein3d_jax.errors import InputError
+from rein3d_jax.geometry.colour import srgb_from_linear
 from rein3d_jax.io.files.input_file import require_file
-from rein3d_jax.io.files.json_file import inside
+from rein3d_jax.io.files.json_file import path_within
 from rein3d_jax.io.meshes.gltf_header import check_gltf
 from rein3d_jax.io.pictures.image import read_rgb
-from rein3d_jax.io.pictures.tone import srgb_from_linear
+from rein3d_jax.meshes.mesh_scene import MeshScene, mesh_scene
 from rein3d_jax.meshes.texture import Texture, texture
-from rein3d_jax.meshes.triangles import MAX_TRIANGLES, Triangles, joined, moved, triangles, z_up
+from rein3d_jax.meshes.triangles import MAX_TRIANGLES, Triangles, join_triangles, transformed, triangles, z_up
 
 _PICTURES = (".png", ".jpg", ".jpeg")
-FORMATS = (".glb", ".gltf", ".obj")
-MEND = "pip install 'rein3d-jax[data]'"
+_FORMATS = (".glb", ".gltf", ".obj")
+_MEND = "pip install 'rein3d-jax[data]'"
 _GREY = np.full(3, 0.8, np.float32)  # what has no colour of its own
 
 
@@ -31,8 +32,8 @@ def read_mesh(path: str | Path, *, up: str = "y", scale: float = 1.0) -> Triangl
     """
     path = Path(path)
     require_file(path)
-    if path.suffix.lower() not in FORMATS:
-        raise InputError(f"{path} is no mesh by its suffix: give one of {', '.join(FORMATS)}")
+    if path.suffix.lower() not in _FORMATS:
+        raise InputError(f"{path} is no mesh by its suffix: give one of {', '.join(_FORMATS)}")
     if up not in ("y", "z") or not (np.isfinite(scale) and scale > 0):
         raise InputError(f"{path}: up {up!r} must be y or z, and scale {scale} positive")
     library = _trimesh()
@@ -40,8 +41,13 @@ def read_mesh(path: str | Path, *, up: str = "y", scale: float = 1.0) -> Triangl
         check_gltf(path)
     parts = _load(path, library)
     metres = np.diag([scale, scale, scale, 1.0])
-    soup = joined([moved(part, metres) for part in parts], path)
+    soup = join_triangles([transformed(part, metres) for part in parts], path)
     return z_up(soup) if up == "y" else soup
+
+
+def read_mesh_scene(path: str | Path, *, up: str = "y", scale: float = 1.0) -> MeshScene:
+    """The scene of a glTF, GLB or OBJ file; its own origin is the world's. Options and errors as read_mesh's."""
+    return mesh_scene(path, read_mesh(path, up=up, scale=scale))
 
 
 def _trimesh() -> ModuleType:
@@ -49,7 +55,7 @@ def _trimesh() -> ModuleType:
         import PIL.Image  # noqa: F401  without it trimesh leaves out every texture, and says nothing
         import trimesh
     except ImportError as error:
-        raise InputError(f"reading meshes needs trimesh and Pillow: {MEND}") from error
+        raise InputError(f"reading meshes needs trimesh and Pillow: {_MEND}") from error
     return trimesh
 
 
@@ -78,7 +84,7 @@ def _resolver(path: Path, trimesh: ModuleType, faults: list[str]) -> object:
     class Folder(trimesh.resolvers.FilePathResolver):
         def get(self, name: str) -> bytes:
             try:
-                file = inside(path.parent, name.strip(), named_by=path)
+                file = path_within(path.parent, name.strip(), named_by=path)
                 if not file.is_file():
                     raise InputError(f"{path} names the file {name.strip()!r}, which is not there: copy it beside it")
                 if file.suffix.lower() in _PICTURES:
@@ -99,7 +105,7 @@ def _parts(path: Path, scene: object, linear: bool) -> list[Triangles]:
         raise InputError(f"{path} has more than {MAX_TRIANGLES} triangles: simplify it")
     pictures: dict[int, Texture] = {}
     encode: Callable = srgb_from_linear if linear else np.asarray
-    return [moved(_part(mesh, encode, pictures), pose) for pose, mesh in meshes]
+    return [transformed(_part(mesh, encode, pictures), pose) for pose, mesh in meshes]
 
 
 def _part(mesh: object, encode: Callable, pictures: dict[int, Texture]) -> Triangles:

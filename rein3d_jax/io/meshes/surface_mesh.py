@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from rein3d_jax.errors import InputError
+from rein3d_jax.geometry.colour import linear_from_srgb
 from rein3d_jax.io.files.atomic import write_bytes
 from rein3d_jax.io.pictures.image import to_uint8
-from rein3d_jax.io.pictures.tone import linear_from_srgb
 
-MEND = "pip install 'rein3d-jax[export]'"
+_MEND = "pip install 'rein3d-jax[export]'"
 _Y_UP_FROM_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # glTF's, as Blender turns it back
 
 
@@ -32,7 +32,7 @@ def surface(
     try:
         from skimage.measure import marching_cubes
     except ImportError as error:
-        raise InputError(f"a mesh needs scikit-image and trimesh: {MEND}") from error
+        raise InputError(f"a mesh needs scikit-image and trimesh: {_MEND}") from error
     signed = np.array(signed)  # scikit-image wants it writable
     least, most = _of_cells(signed, np.minimum), _of_cells(signed, np.maximum)
     cells = _of_cells(np.asarray(known), np.logical_and) & (most - least < jump)
@@ -78,5 +78,5 @@ def _trimesh():
     try:
         import trimesh
     except ImportError as error:
-        raise InputError(f"a mesh needs scikit-image and trimesh: {MEND}") from error
+        raise InputError(f"a mesh needs scikit-image and trimesh: {_MEND}") from error
     return trimesh

@@ -14,8 +14,8 @@ import numpy as np
 from rein3d_jax.errors import InputError
 from rein3d_jax.scene import Pair, Video
 
-FARTHEST = 65504.0  # metres: float16's largest
-MAX_BYTES = 2**31  # of one record: a paper-sized clip (41 frames, 448 x 896) takes 0.2 GB
+_FARTHEST = 65504.0  # metres: float16's largest
+_MAX_BYTES = 2**31  # of one record: a paper-sized clip (41 frames, 448 x 896) takes 0.2 GB
 
 
 def encode_pair(pair: Pair) -> bytes:
@@ -61,7 +61,7 @@ _DTYPES = {
 def _arrays(data: bytes) -> dict[str, np.ndarray]:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         size = sum(entry.file_size for entry in archive.infolist())
-    if size > MAX_BYTES:
+    if size > _MAX_BYTES:
         raise ValueError(f"{size} bytes")
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
         return {name: archive[name] for name in _DTYPES}
@@ -79,4 +79,4 @@ def _levels(values) -> np.ndarray:
 
 
 def _metres(distance) -> np.ndarray:
-    return np.clip(np.asarray(distance), 0, FARTHEST).astype(np.float16)
+    return np.clip(np.asarray(distance), 0, _FARTHEST).astype(np.float16)

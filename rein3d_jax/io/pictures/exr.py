@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 
+from rein3d_jax.geometry.colour import linear_from_srgb
 from rein3d_jax.io.files.atomic import atomic_path
-from rein3d_jax.io.pictures.tone import linear_from_srgb
 
 
 def write_rgb_exr(path: str | Path, rgb: np.ndarray) -> None:

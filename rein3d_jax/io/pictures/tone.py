@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from rein3d_jax.geometry.colour import srgb_from_linear
+
 KEY = 0.18  # the exposed log-average luminance: middle grey (Reinhard et al. 2002, eq. 1-2)
 _REC709_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 _SATURATED = 16.0  # the curve passes 1 near 7; beyond this its squares only risk overflow
@@ -12,7 +14,7 @@ def tone_map(linear: np.ndarray) -> np.ndarray:
     """Panorama (h, w, 3) of linear Rec. 709 light in any unit -> sRGB float32 in [0, 1].
 
     NaN and negative light count as 0, infinite light as the brightest finite value. The result does not change
-    when the input is multiplied by a constant or turned about the vertical.
+    when the input is multiplied by a constant or rotated about the vertical.
     """
     linear = finite_light(linear)
     with np.errstate(over="ignore"):  # inf is cut to _SATURATED
@@ -43,13 +45,3 @@ def filmic(x: np.ndarray) -> np.ndarray:
     """x (2.51 x + 0.03) / (x (2.43 x + 0.59) + 0.14), by channel: Narkowicz 2015, "ACES filmic tone mapping
     curve". Bright saturated lights go towards white, as on film."""
     return x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)
-
-
-def srgb_from_linear(linear: np.ndarray) -> np.ndarray:
-    """The sRGB transfer (IEC 61966-2-1) of values in [0, 1]."""
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.power(linear, 1 / 2.4) - 0.055)
-
-
-def linear_from_srgb(srgb: np.ndarray) -> np.ndarray:
-    """The inverse of `srgb_from_linear`."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, np.power((srgb + 0.055) / 1.055, 2.4))

@@ -17,10 +17,10 @@ import numpy as np
 
 from rein3d_jax.conventions import PINHOLE
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.files.json_file import inside, read_json
+from rein3d_jax.io.files.json_file import path_within, read_json
 from rein3d_jax.io.pictures.decode import open_image
 from rein3d_jax.io.pictures.image import read_rgb
-from rein3d_jax.io.rooms.posed_panorama import PosedPanorama, pose_of_turn, read_panorama, rigid_pose
+from rein3d_jax.io.rooms.posed_panorama import PosedPanorama, panorama_pose, read_rgbd_panorama, rigid_pose
 from rein3d_jax.scene import Camera
 
 
@@ -60,7 +60,7 @@ def read_traced_room(path: str | Path) -> TracedRoom:
     scene = read_json(path)
     with _faults_named(path, "a room", "input with rgb and distance"):
         start = _pano(path, {"c2w": np.eye(4)} | scene["input"])
-    views = read_views(path) if "views" in scene else ()
+    views = read_posed_views(path) if "views" in scene else ()
     with _faults_named(path, "a list of panos", "rgb, distance, c2w each"):
         panos = tuple(_pano(path, entry) for entry in scene.get("panos", ()))
     with _faults_named(path, "a list of video frames", "rgb, c2w each"):
@@ -69,7 +69,7 @@ def read_traced_room(path: str | Path) -> TracedRoom:
     return TracedRoom(start, views, panos, video)
 
 
-def read_views(path: str | Path, *, anywhere: bool = False) -> tuple[View, ...]:
+def read_posed_views(path: str | Path, *, anywhere: bool = False) -> tuple[View, ...]:
     """The views of the scene.json at `path`; `anywhere`: their files may lie outside its folder. Raises InputError
     as `read_traced_room` does."""
     path = Path(path)
@@ -95,7 +95,7 @@ def _view(path: Path, entry: dict[str, Any], anywhere: bool) -> View:
     numbers = np.asarray([entry[name] for name in ("fx", "fy", "cx", "cy")], np.float32)
     if not np.isfinite(numbers).all() or numbers[:2].min() <= 0:
         raise ValueError("fx and fy must be positive, cx and cy finite")
-    file = path.parent / entry["rgb"] if anywhere else inside(path.parent, entry["rgb"], named_by=path)
+    file = path.parent / entry["rgb"] if anywhere else path_within(path.parent, entry["rgb"], named_by=path)
     width, height = _size(file)
     _check_size(file, (width, height), (entry.get("width", width), entry.get("height", height)), path)
     rgb = read_rgb(file, panorama=False)
@@ -105,13 +105,13 @@ def _view(path: Path, entry: dict[str, Any], anywhere: bool) -> View:
 
 def _pano(path: Path, entry: dict[str, Any]) -> PosedPanorama:
     pose = _pano_pose(entry["c2w"])
-    rgb, distance = (inside(path.parent, entry[name], named_by=path) for name in ("rgb", "distance"))
-    return PosedPanorama(entry["rgb"], read_panorama(rgb, distance), pose)
+    rgb, distance = (path_within(path.parent, entry[name], named_by=path) for name in ("rgb", "distance"))
+    return PosedPanorama(entry["rgb"], read_rgbd_panorama(rgb, distance), pose)
 
 
 def _frame(path: Path, entry: dict[str, Any], size: tuple[int, int]) -> Frame:
     pose = _pano_pose(entry["c2w"])
-    file = inside(path.parent, entry["rgb"], named_by=path)
+    file = path_within(path.parent, entry["rgb"], named_by=path)
     _check_size(file, _size(file), size, path)
     return Frame(entry["rgb"], read_rgb(file), pose)
 
@@ -119,12 +119,12 @@ def _frame(path: Path, entry: dict[str, Any], size: tuple[int, int]) -> Frame:
 def _pano_pose(c2w: object) -> np.ndarray:
     """A panorama's c2w, of axes that look along +X, as world_from_camera."""
     pose = rigid_pose(c2w)
-    return pose_of_turn(pose[:3, :3], pose[:3, 3])
+    return panorama_pose(pose[:3, :3], pose[:3, 3])
 
 
 def _first_size(path: Path, entries: list[dict[str, Any]]) -> tuple[int, int]:
     """(width, height) of the film's first frame, which all others must have."""
-    return _size(inside(path.parent, entries[0]["rgb"], named_by=path)) if entries else (0, 0)
+    return _size(path_within(path.parent, entries[0]["rgb"], named_by=path)) if entries else (0, 0)
 
 
 def _size(file: Path) -> tuple[int, int]:

@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from rein3d_jax.errors import InputError
+from rein3d_jax.geometry.spherical_harmonics import C0, sh_from_rgb
 from rein3d_jax.io.files.atomic import write_bytes
 from rein3d_jax.io.files.input_file import require_file
 from rein3d_jax.io.splats.gaussian_columns import REST_COUNTS, Columns, alive_columns, from_columns
-from rein3d_jax.io.splats.quantise import SH_C0, alpha_bytes, alpha_logits, from_levels, to_levels
+from rein3d_jax.io.splats.quantise import alpha_bytes, alpha_logits, from_levels, to_levels, with_largest
 from rein3d_jax.scene import Gaussians
 
-CHUNK = 256  # Gaussians
+_CHUNK = 256  # Gaussians
 _BOUNDS = [f"{end}_{name}" for stem in ("{}", "scale_{}") for end in ("min", "max") for name in map(stem.format, "xyz")]
 _COLOUR_BOUNDS = [f"{end}_{channel}" for end in ("min", "max") for channel in "rgb"]
 _PACKED = ["packed_position", "packed_rotation", "packed_scale", "packed_color"]
@@ -33,7 +34,7 @@ def write_compressed_ply(path: str | Path, gaussians: Gaussians) -> None:
     count = len(means)
     places, place_bounds = _pack_bounded(means, (11, 10, 11))
     scales, scale_bounds = _pack_bounded(np.clip(log_scales, -_SCALE_LIMIT, _SCALE_LIMIT), (11, 10, 11))
-    colours, colour_bounds = _pack_bounded(0.5 + SH_C0 * sh[:, 0], (8, 8, 8))
+    colours, colour_bounds = _pack_bounded(0.5 + C0 * sh[:, 0], (8, 8, 8))
     words = np.stack([places, _pack_quats(quats), scales, colours << 8 | alpha_bytes(logits)], axis=1)
     bounds = np.concatenate([place_bounds, scale_bounds, colour_bounds], axis=1)
     rest = sh[:, 1:].swapaxes(1, 2).reshape(count, 3 * (sh.shape[1] - 1))
@@ -57,7 +58,7 @@ def read_compressed_ply(path: str | Path) -> Gaussians:
     require_file(path)
     coloured, rest, count, start = _read_layout(path)
     per_chunk = 18 if coloured else 12
-    chunks = -(-count // CHUNK)
+    chunks = -(-count // _CHUNK)
     bounds = np.fromfile(path, "<f4", chunks * per_chunk, offset=start).reshape(chunks, per_chunk)
     start += bounds.nbytes
     words = np.fromfile(path, "<u4", 4 * count, offset=start).reshape(count, 4)
@@ -66,7 +67,7 @@ def read_compressed_ply(path: str | Path) -> Gaussians:
     means = _unpack_bounded(words[:, 0], bounds[:, :6], (11, 10, 11))
     log_scales = _unpack_bounded(words[:, 2], bounds[:, 6:12], (11, 10, 11))
     rgb = _unpack_bounded(words[:, 3] >> 8, bounds[:, 12:], (8, 8, 8))
-    sh = np.concatenate([((rgb - 0.5) / SH_C0)[:, None], 8 * ((levels + 0.5) / 256 - 0.5).swapaxes(1, 2)], axis=1)
+    sh = np.concatenate([sh_from_rgb(rgb)[:, None], 8 * ((levels + 0.5) / 256 - 0.5).swapaxes(1, 2)], axis=1)
     logits = alpha_logits(words[:, 3].astype(np.uint8))
     fields = (means, log_scales, _unpack_quats(words[:, 1]), logits, sh)
     return from_columns(Columns(*(field.astype(np.float32) for field in fields)), path)
@@ -103,7 +104,7 @@ def _read_layout(path: Path) -> tuple[bool, int, int, int]:
             if not mark or text + "\nend_header\n" != _known_header(chunks, count, 3 * rest, coloured):
                 continue
             needed = start + 4 * chunks * (18 if coloured else 12) + count * (16 + 3 * rest)
-            if chunks != -(-count // CHUNK) or needed > size:
+            if chunks != -(-count // _CHUNK) or needed > size:
                 raise InputError(f"{path} declares {count} Gaussians in {chunks} chunks, {needed} bytes, but has {size}"
                                  ": it is damaged, copy or export it again")  # fmt: skip
             return coloured, 3 * rest, count, start
@@ -121,7 +122,7 @@ def _known_header(chunks: int, count: int, rest: int, coloured: bool) -> str:
 
 def _pack_bounded(values: np.ndarray, bits: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
     """(n, 3) -> uint32 (n,) and each chunk's bounds (chunks, 6), minima first."""
-    starts = np.arange(0, len(values), CHUNK)
+    starts = np.arange(0, len(values), _CHUNK)
     if not len(starts):
         return np.zeros(0, np.uint32), np.zeros((0, 6), np.float32)
     bounds = np.hstack([np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)]).astype(np.float32)
@@ -140,7 +141,7 @@ def _unpack_bounded(words: np.ndarray, bounds: np.ndarray, bits: tuple[int, int,
 
 def _each(bounds: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Chunk bounds (chunks, 6) -> low and high (n, 3) of every Gaussian."""
-    low, high = np.split(bounds.astype(np.float64).repeat(CHUNK, axis=0)[:count], 2, axis=1)
+    low, high = np.split(bounds.astype(np.float64).repeat(_CHUNK, axis=0)[:count], 2, axis=1)
     return low, high
 
 
@@ -163,7 +164,4 @@ def _pack_quats(quats: np.ndarray) -> np.ndarray:
 
 def _unpack_quats(words: np.ndarray) -> np.ndarray:
     others = np.stack([from_levels(words >> shift, 10) - 0.5 for shift in (20, 10, 0)], axis=1) * np.sqrt(2)
-    last = np.sqrt(np.maximum(0, 1 - (others**2).sum(axis=1, keepdims=True)))
-    place, largest = np.arange(4), (words >> 30)[:, None]
-    source = np.where(place == largest, 3, place - (place > largest))
-    return np.take_along_axis(np.hstack([others, last]), source, axis=1)
+    return with_largest(others, words >> 30)

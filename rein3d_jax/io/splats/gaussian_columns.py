@@ -37,11 +37,15 @@ def from_columns(columns: Columns, path: str | Path) -> Gaussians:
     return Gaussians(*map(jnp.asarray, fields))
 
 
-def _checked(columns: Columns, path: str | Path) -> Columns:
-    bad = sum(field.size - int(np.isfinite(field).sum()) for field in columns)
-    if bad:
-        count = len(columns.means)
+def require_finite(path: str | Path, *fields: np.ndarray) -> None:
+    """Raises InputError, naming `path`, if a value of `fields`, a row a Gaussian each, is not finite."""
+    if bad := sum(field.size - int(np.isfinite(field).sum()) for field in fields):
+        count = len(fields[0])
         raise InputError(f"{path}: {bad} values of its {count} Gaussians are not finite: repair the scene first")
+
+
+def _checked(columns: Columns, path: str | Path) -> Columns:
+    require_finite(path, *columns)
     with np.errstate(over="ignore"):
         norms = np.linalg.norm(columns.quats, axis=-1, keepdims=True)
     if bad := int(((norms == 0) | np.isinf(norms)).sum()):

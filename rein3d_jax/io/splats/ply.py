@@ -5,18 +5,17 @@ x y z  nx ny nz (0)  f_dc_0..2  f_rest_0..(3k - 1), channel-major  opacity (logi
 
 from pathlib import Path
 
-import jax.numpy as jnp
 import numpy as np
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import atomic_path
 from rein3d_jax.io.files.input_file import require_file
+from rein3d_jax.io.splats.gaussian_columns import REST_COUNTS, Columns, from_columns, require_finite
 from rein3d_jax.scene import Gaussians
 
 _NORMALS = ["nx", "ny", "nz"]  # always 0: viewers expect the columns, nobody reads them
-ANTIALIASED = "comment antialiased (Mip-Splatting, eq. 9)"
+_ANTIALIASED = "comment antialiased (Mip-Splatting, eq. 9)"
 _HEADER_LIMIT = 65536  # bytes; a degree-3 header takes 1500
-_REST_COUNTS = (0, 9, 24, 45)  # 3 ((degree + 1)^2 - 1)
 _TYPES = dict(char="i1", uchar="u1", short="i2", ushort="u2", int="i4", uint="u4", float="f4", double="f8")
 _TYPES |= dict(int8="i1", uint8="u1", int16="i2", uint16="u2", int32="i4", uint32="u4", float32="f4", float64="f8")
 
@@ -26,10 +25,10 @@ def write_ply(path: str | Path, gaussians: Gaussians, *, antialias: bool = False
     scales opacity by what its filter spreads out; the layout has no field for it, and one that does not shows small
     splats too dense. Raises InputError, and writes nothing, if any value is not finite."""
     table = _table(gaussians)
-    _check_finite(path, table)
+    require_finite(path, table)
     names = _property_names(table.shape[1] - 17)
     names[3:3] = _NORMALS
-    lines = ["ply", "format binary_little_endian 1.0", *[ANTIALIASED] * antialias, f"element vertex {len(table)}"]
+    lines = ["ply", "format binary_little_endian 1.0", *[_ANTIALIASED] * antialias, f"element vertex {len(table)}"]
     lines += [f"property float {name}" for name in names] + ["end_header", ""]
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
         file.write("\n".join(lines).encode())
@@ -48,8 +47,9 @@ def read_ply(path: str | Path) -> Gaussians:
         raise InputError(f"{path} lacks the properties {', '.join(missing)}: export it as a 3DGS PLY")
     vertices = np.fromfile(path, vertex, count, offset=start)
     table = np.stack([vertices[name] for name in names], axis=1, dtype=np.float32, casting="same_kind")
-    _check_finite(path, table)
-    return _gaussians(path, *np.split(table, np.cumsum([3, 3, rest, 1, 3]), axis=1))
+    means, dc, higher, opacity, log_scales, quats = np.split(table, np.cumsum([3, 3, rest, 1, 3]), axis=1)
+    sh = np.concatenate([dc[:, None], higher.reshape(count, 3, rest // 3).swapaxes(1, 2)], axis=1)
+    return from_columns(Columns(means, log_scales, quats, opacity[:, 0], sh), path)
 
 
 def _property_names(rest: int) -> list[str]:
@@ -72,30 +72,6 @@ def _table(gaussians: Gaussians) -> np.ndarray:
     return np.concatenate(columns, axis=1, dtype="<f4")
 
 
-def _gaussians(
-    path: Path,
-    means: np.ndarray,
-    dc: np.ndarray,
-    rest: np.ndarray,
-    opacity: np.ndarray,
-    log_scales: np.ndarray,
-    quats: np.ndarray,
-) -> Gaussians:
-    n, k = len(means), rest.shape[1] // 3
-    with np.errstate(over="ignore"):
-        norms = np.linalg.norm(quats, axis=-1, keepdims=True)
-    if bad := int(((norms == 0) | np.isinf(norms)).sum()):
-        raise InputError(f"{path} has {bad} quaternions without a direction: remove those splats")
-    sh = np.concatenate([dc[:, None], rest.reshape(n, 3, k).swapaxes(1, 2)], axis=1)
-    fields = (means, log_scales, quats / norms, opacity[:, 0], sh, np.ones(n, bool))
-    return Gaussians(*map(jnp.asarray, fields))
-
-
-def _check_finite(path: str | Path, table: np.ndarray) -> None:
-    if bad := table.size - int(np.isfinite(table).sum()):
-        raise InputError(f"{path}: {bad} values of its {len(table)} Gaussians are not finite: repair the scene first")
-
-
 def _read_layout(path: Path) -> tuple[int, np.dtype, int]:
     """Vertex count, vertex layout and the byte where vertices start, checked against the file's size."""
     require_file(path)
@@ -111,7 +87,7 @@ def _read_layout(path: Path) -> tuple[int, np.dtype, int]:
 
 def _rest_count(path: Path, vertex: np.dtype) -> int:
     count = sum(name.startswith("f_rest_") for name in vertex.names)
-    if count not in _REST_COUNTS:
+    if count not in [3 * rest for rest in REST_COUNTS]:
         raise InputError(f"{path} has {count} f_rest properties: export it with SH degree 0 to 3 (0, 9, 24 or 45)")
     return count
 

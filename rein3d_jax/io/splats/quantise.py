@@ -2,8 +2,6 @@
 
 import numpy as np
 
-SH_C0 = 0.28209479177387814  # the constant spherical harmonic: colour = 0.5 + SH_C0 * coefficient
-
 
 def to_levels(unit: np.ndarray, bits: int) -> np.ndarray:
     """[0, 1] of any shape -> uint32 in [0, 2^bits - 1]; what lies outside is clipped. Off by at most half a level."""
@@ -26,3 +24,12 @@ def alpha_logits(alphas: np.ndarray) -> np.ndarray:
     """uint8 (...,) -> logits, float32. 0 and 255 stand for a quarter level from the end, so that logits are finite."""
     alpha = np.clip(alphas.astype(np.float64), 0.25, 254.75) / 255
     return np.log(alpha / (1 - alpha)).astype(np.float32)
+
+
+def with_largest(others: np.ndarray, largest: np.ndarray) -> np.ndarray:
+    """Unit quaternions (n, 4) of three components (n, 3) in their order and the place (n,) of the largest, which is
+    positive and left out."""
+    last = np.sqrt(np.maximum(0, 1 - (others**2).sum(axis=1, keepdims=True)))
+    place = np.arange(4)
+    source = np.where(place == largest[:, None], 3, place - (place > largest[:, None]))
+    return np.take_along_axis(np.hstack([others, last]), source, axis=1)

@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from rein3d_jax.errors import InputError
+from rein3d_jax.geometry.spherical_harmonics import C0, sh_from_rgb
 from rein3d_jax.io.files.atomic import write_bytes
 from rein3d_jax.io.files.input_file import require_file
 from rein3d_jax.io.splats.gaussian_columns import Columns, alive_columns, from_columns
-from rein3d_jax.io.splats.quantise import SH_C0, alpha_bytes, alpha_logits, from_levels, to_levels
+from rein3d_jax.io.splats.quantise import alpha_bytes, alpha_logits, from_levels, to_levels
 from rein3d_jax.scene import Gaussians
 
 _SPLAT = np.dtype([("means", "<f4", 3), ("scales", "<f4", 3), ("rgb", "u1", 3), ("alpha", "u1"), ("quats", "u1", 4)])
@@ -26,7 +27,7 @@ def write_splat(path: str | Path, gaussians: Gaussians) -> None:
     columns = alive_columns(gaussians, path)
     table = np.zeros(len(columns.means), _SPLAT)
     table["means"], table["scales"] = columns.means, np.exp(np.clip(columns.log_scales, *_LOG_SCALES))
-    table["rgb"] = to_levels(0.5 + SH_C0 * columns.sh[:, 0], 8)
+    table["rgb"] = to_levels(0.5 + C0 * columns.sh[:, 0], 8)
     table["alpha"] = alpha_bytes(columns.opacity_logits)
     table["quats"] = np.clip(np.round(128 + 128 * columns.quats), 0, 255)
     write_bytes(path, table.tobytes())
@@ -45,9 +46,7 @@ def read_splat(path: str | Path) -> Gaussians:
     if bad := int((scales < 0).sum()):
         raise InputError(f"{path} has {bad} scales below 0: it is damaged or no .splat file, export it again")
     quats = (table["quats"].astype(np.float32) - 128) / 128
-    sh = ((from_levels(table["rgb"], 8) - 0.5) / SH_C0).astype(np.float32)[:, None]
-    means, log_scales = (
-        np.ascontiguousarray(table["means"]),
-        np.log(np.maximum(scales, np.exp(np.float32(_LOG_SCALES[0])))),
-    )
+    sh = sh_from_rgb(from_levels(table["rgb"], 8)).astype(np.float32)[:, None]
+    log_scales = np.log(np.maximum(scales, np.exp(np.float32(_LOG_SCALES[0]))))
+    means = np.ascontiguousarray(table["means"])
     return from_columns(Columns(means, log_scales, quats, alpha_logits(table["alpha"]), sh), path)

@@ -19,10 +19,10 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_bytes
 from rein3d_jax.io.files.input_file import require_file
 from rein3d_jax.io.splats.gaussian_columns import REST_COUNTS, Columns, alive_columns, from_columns
-from rein3d_jax.io.splats.quantise import alpha_bytes, alpha_logits
+from rein3d_jax.io.splats.quantise import alpha_bytes, alpha_logits, with_largest
 from rein3d_jax.scene import Gaussians
 
-MAX_GAUSSIANS = 10_000_000  # the reference library reads no more
+_MAX_GAUSSIANS = 10_000_000  # the reference library reads no more
 _HEADER = struct.Struct("<4sIIBBBB")  # magic, version, count, SH degree, fractional bits, flags, reserved
 _FRACTIONAL_BITS = 12  # of the 24: 0.24 mm, and 2 km to either side
 _COLOUR_SCALE = 0.15  # 0.5 + 0.15 f_dc fills the byte
@@ -35,12 +35,12 @@ _FLIP_REST = np.array([-1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1], np.
 
 def encode_spz(gaussians: Gaussians, name: str | Path = "the scene", *, antialias: bool = False) -> bytes:
     """The alive slots as the bytes of an SPZ file; `antialias` sets the flag that write_ply explains. Raises
-    InputError, calling the scene `name`, if a value is not finite, if there are over MAX_GAUSSIANS, or if it reaches
+    InputError, calling the scene `name`, if a value is not finite, if there are over _MAX_GAUSSIANS, or if it reaches
     beyond 8000 km."""
     c = alive_columns(gaussians, name)
     count, bits = len(c.means), _fractional_bits(c.means, name)
-    if count > MAX_GAUSSIANS:
-        raise InputError(f"{name} has {count} Gaussians, more than the {MAX_GAUSSIANS} of an SPZ file: write a PLY")
+    if count > _MAX_GAUSSIANS:
+        raise InputError(f"{name} has {count} Gaussians, more than the {_MAX_GAUSSIANS} of an SPZ file: write a PLY")
     fixed = np.round(c.means.astype(np.float64) * _FLIP * 2**bits).astype("<i4")
     parts = [
         fixed[..., None].view(np.uint8)[..., :3],
@@ -61,7 +61,7 @@ def write_spz(path: str | Path, gaussians: Gaussians, *, antialias: bool = False
 
 def read_spz(path: str | Path) -> Gaussians:
     """The scene in an SPZ file of version 2 or 3, every slot alive. Raises InputError if it is missing, damaged, of
-    another version, over MAX_GAUSSIANS, or not exactly as long as it declares, before more than that is unpacked."""
+    another version, over _MAX_GAUSSIANS, or not exactly as long as it declares, before more than that is unpacked."""
     path = Path(path)
     require_file(path)
     version, count, degree, bits, data = _unpack(path)
@@ -131,7 +131,7 @@ def _layout(path: Path, header: bytes, packed: int) -> tuple[int, int, int, int,
     if degree >= len(REST_COUNTS) or bits > 23:
         raise InputError(f"{path} declares SH degree {degree} and {bits} fractional bits: export it with degree 0 to 3")
     size = count * (16 + _ROTATION_BYTES[version] + 3 * REST_COUNTS[degree])
-    if count > MAX_GAUSSIANS or size > _DEFLATE_RATIO * packed:
+    if count > _MAX_GAUSSIANS or size > _DEFLATE_RATIO * packed:
         raise InputError(f"{path} declares {count} Gaussians in {packed} bytes: it is damaged, copy or export it again")
     return version, count, degree, bits, size
 
@@ -152,10 +152,6 @@ def _quats_from_xyz(rotation: np.ndarray) -> np.ndarray:
 def _quats_from_smallest_three(rotation: np.ndarray) -> np.ndarray:
     """Version 3: 2 bits say which of x y z w is largest, the others follow with 1 + 9 bits each -> wxyz (n, 4)."""
     word = np.ascontiguousarray(rotation).view("<u4")[:, 0]
-    largest = word >> 30
     others = np.stack([(word >> shift) & 1023 for shift in (20, 10, 0)], axis=1).astype(np.int32)
     values = np.where(others & 512, -1, 1) * (others & 511) * (np.sqrt(0.5) / 511)
-    last = np.sqrt(np.maximum(0, 1 - (values**2).sum(axis=1, keepdims=True)))
-    place = np.arange(4)[None]
-    source = np.where(place == largest[:, None], 3, place - (place > largest[:, None]))
-    return np.take_along_axis(np.hstack([values, last]), source, axis=1)[:, [3, 0, 1, 2]]
+    return with_largest(values, word >> 30)[:, [3, 0, 1, 2]]

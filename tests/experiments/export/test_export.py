@@ -14,10 +14,10 @@ from experiments.run_folder import open_run
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.poses import upright
 from rein3d_jax.geometry.signed_distance import blank_field, fuse
+from rein3d_jax.geometry.sphere import rays_of_pose64
 from rein3d_jax.io.meshes.surface_mesh import surface, without_islands, write_glb
 from rein3d_jax.io.pictures.distance import read_distance
 from rein3d_jax.io.pictures.image import read_rgb
-from rein3d_jax.io.rooms.posed_panorama import rays_of_pose
 from rein3d_jax.io.splats.gaussian_file import read_gaussians
 
 VOXEL = 0.06
@@ -69,7 +69,7 @@ def test_the_mesh_of_exact_panoramas_is_the_room(room, room_seen, tmp_path):
     field = blank_field(low, tuple(np.ceil((high - low) / VOXEL).astype(int)), VOXEL)
     for x, y, z, yaw in [(0, 0, 0, 0), (0.4, 1.2, 0.3, 1), (2.3, 0, 0.3, 2), (-1.5, -1.5, -0.5, 3), (1.2, -1.6, 0, 0)]:
         pose = np.asarray(upright(np.array([x, y, z]), yaw), np.float64)
-        rgb, distance = room_seen(pose[:3, 3], rays_of_pose(pose, 128))
+        rgb, distance = room_seen(pose[:3, 3], rays_of_pose64(pose, 128))
         field = fuse(field, np.float32(rgb), np.float32(distance), np.float32(pose))
     write_glb(tmp_path / "x.glb", without_islands(surface_of(field), 0.05))
     mesh = trimesh.load(tmp_path / "x.glb", force="mesh", process=False)

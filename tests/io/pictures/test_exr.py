@@ -3,8 +3,8 @@
 import numpy as np
 import OpenImageIO as oiio
 
+from rein3d_jax.geometry.colour import linear_from_srgb, srgb_from_linear
 from rein3d_jax.io.pictures.exr import write_exr, write_rgb_exr
-from rein3d_jax.io.pictures.tone import linear_from_srgb, srgb_from_linear
 
 
 def read(path):

@@ -52,7 +52,8 @@ def test_a_folder_of_every_format(tmp_path):
     found = panorama_sets(tmp_path)
     assert [files.name for files in found] == ["a", "b", "c"]
     for files in found:
-        np.testing.assert_allclose(read_rgbd_panorama(files.rgb, files.distance).distance, DISTANCE, rtol=1e-6)  # float32
+        distance = read_rgbd_panorama(files.rgb, files.distance).distance
+        np.testing.assert_allclose(distance, DISTANCE, rtol=1e-6)  # float32
 
 
 def test_faults_of_a_folder(tmp_path):

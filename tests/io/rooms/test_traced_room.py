@@ -10,10 +10,10 @@ import pytest
 from experiments.reconstruct.inputs import SAMPLES
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.poses import pinhole_camera, upright
+from rein3d_jax.geometry.sphere import rays_of_pose64
 from rein3d_jax.io.pictures.distance import write_distance_exr
 from rein3d_jax.io.pictures.image import write_rgb
-from rein3d_jax.io.rooms.posed_panorama import rays_of_pose
-from rein3d_jax.io.rooms.traced_room import read_traced_room, read_views
+from rein3d_jax.io.rooms.traced_room import read_posed_views, read_traced_room
 
 SHAPE = (16, 32)
 BOX = np.array([[-2.0, -3.0, -1.6], [4.0, 1.0, 1.2]])  # walls of a room around the input
@@ -35,7 +35,7 @@ def quarter_left(position):
 def write_room(folder):
     """A box room whose panoramas carry their distance as colour, too."""
     for name, eye, turn in (("input", (0, 0, 0), np.eye(4)), ("pano", (1, -1, 0), quarter_left((1, -1, 0)))):
-        rays = rays_of_pose(upright(np.zeros(3)), 16) @ turn[:3, :3].T
+        rays = rays_of_pose64(upright(np.zeros(3)), 16) @ turn[:3, :3].T
         distance = box_distance(np.array(eye), rays)
         write_distance_exr(folder / f"{name}_distance.exr", distance)
         write_rgb(folder / f"{name}.png", np.repeat(distance[..., None] / 8, 3, -1))
@@ -59,7 +59,7 @@ def test_everything_is_read_in_our_frame(tmp_path):
     np.testing.assert_allclose(room.input.world_from_camera, upright(np.zeros(3)), atol=1e-7)
     for pano in (room.input, *room.panos):
         pose, panorama = pano.world_from_camera, pano.panorama
-        expected = box_distance(pose[:3, 3], rays_of_pose(pose, 16))
+        expected = box_distance(pose[:3, 3], rays_of_pose64(pose, 16))
         np.testing.assert_allclose(panorama.distance, expected, atol=1e-6)  # float32
         np.testing.assert_allclose(panorama.rgb[..., 0] * 8, expected, atol=8 * 0.51 / 255)  # 8 bits
     np.testing.assert_array_equal(room.video[1].world_from_camera, room.panos[0].world_from_camera)
@@ -74,7 +74,7 @@ def test_everything_is_read_in_our_frame(tmp_path):
 def test_the_packaged_room():
     room = read_traced_room(SAMPLES / "room")
     assert room.input.panorama.rgb.shape[:2] == room.input.panorama.distance.shape
-    assert len(room.views) == 24 and len(read_views(SAMPLES / "room/scene.json")) == 24
+    assert len(room.views) == 24 and len(read_posed_views(SAMPLES / "room/scene.json")) == 24
 
 
 def test_parts_that_a_room_lacks_are_empty(tmp_path):
@@ -152,6 +152,6 @@ def test_what_is_no_scene(tmp_path, text):
     with pytest.raises(InputError, match=r"scene.json(: not a room| is no JSON)"):
         read_traced_room(tmp_path)
     with pytest.raises(InputError, match=r"scene.json(: not a list of views| is no JSON)"):
-        read_views(tmp_path / "scene.json")
+        read_posed_views(tmp_path / "scene.json")
     with pytest.raises(InputError, match="cannot be read"):
         read_traced_room(Path(tmp_path / "none.json"))

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.weights.metric_weights import SHIPPED, brisque_weights, i3d_weights, lpips_weights, niqe_weights
+from rein3d_jax.io.weights.metric_weights import (
+    METRIC_WEIGHTS,
+    brisque_weights,
+    i3d_weights,
+    lpips_weights,
+    niqe_weights,
+)
 
 LOADERS = {"lpips_alex": lpips_weights, "niqe": niqe_weights, "brisque": brisque_weights}
 
@@ -19,7 +25,7 @@ def test_what_is_shipped_loads(name):
 
 @pytest.mark.parametrize("name", LOADERS)
 def test_damage_is_named(name, tmp_path):
-    data, path = (SHIPPED / f"{name}.npz").read_bytes(), tmp_path / "damaged.npz"
+    data, path = (METRIC_WEIGHTS / f"{name}.npz").read_bytes(), tmp_path / "damaged.npz"
     for broken in (b"", data[: len(data) // 2], data[:3000] + b"\0" * 500 + data[3500:]):
         path.write_bytes(broken)
         with pytest.raises(InputError, match=rf"(?s)^(?!.*\n).*{re.escape(str(path))}.*reinstall"):
@@ -40,4 +46,4 @@ def test_i3d_says_how_to_make_its_file(tmp_path):
     with pytest.raises(InputError, match=r"i3d\.npz cannot be read.*convert_weights i3d"):
         i3d_weights(tmp_path / "i3d.npz")
     with pytest.raises(InputError, match=r"does not hold.*convert_weights i3d"):
-        i3d_weights(SHIPPED / "niqe.npz")
+        i3d_weights(METRIC_WEIGHTS / "niqe.npz")

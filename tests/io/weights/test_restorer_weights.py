@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.weights.restorer_weights import SIZES, read_restorer, write_restorer
+from rein3d_jax.io.weights.restorer_weights import SIZES_NAME, read_restorer, write_restorer
 
 SIZE = {"rows": 16, "width": 32}
 RNG = np.random.default_rng(0)
@@ -85,7 +85,7 @@ def test_a_file_of_which_a_byte_changed_is_refused_or_reads_as_it_was(written, p
 
 @pytest.mark.parametrize("sizes", [None, b"", b"\xff", b"[1, 2]", b"3", b'{"rows": null}', b'{"rows": "many"}'])
 def test_arrays_without_a_networks_sizes_are_no_weights(tmp_path, sizes):
-    named = {} if sizes is None else {SIZES: np.frombuffer(sizes, np.uint8)}
+    named = {} if sizes is None else {SIZES_NAME: np.frombuffer(sizes, np.uint8)}
     np.savez(tmp_path / "other.npz", kernel=np.ones(3, np.float16), **named)
     assert "restorer's weights" in refusal(tmp_path / "other.npz")
 
@@ -95,7 +95,7 @@ def test_other_files_are_refused(tmp_path):
     (tmp_path / "text.npz").write_text("weights")
     pickled = np.array([{"a": 1}], dtype=object)
     text = np.frombuffer(json.dumps(SIZE).encode(), np.uint8)
-    np.savez(tmp_path / "objects.npz", kernel=pickled, **{SIZES: text})
-    np.savez(tmp_path / "words.npz", kernel=np.array(["a"]), **{SIZES: text})
+    np.savez(tmp_path / "objects.npz", kernel=pickled, **{SIZES_NAME: text})
+    np.savez(tmp_path / "words.npz", kernel=np.array(["a"]), **{SIZES_NAME: text})
     for name in ("one.npy", "text.npz", "objects.npz", "words.npz", ""):
         refusal(tmp_path / name)

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rein3d_jax.conventions import EYE_HEIGHT
 from rein3d_jax.errors import InputError
 from rein3d_jax.meshes.mesh_scene import MeshScene
 
-EYE_HEIGHT = 1.6  # metres above the floor; the paper's Sec. 3
 _LEVELS = (0.4, 1.0)  # metres above the floor at which, besides eye height, clearance is measured
 _AZIMUTHS = 48
-_FINEST, _MOST = 0.1, 64  # metres between places tried, and places tried along a side
+_GRID_STEP, _GRID_SIZE = 0.1, 64  # metres between places tried at least, and places tried along a side at most
 _FLAT = 0.99  # |cosine| of a normal that counts as level
 _BIN = 0.02  # metres: a floor's triangles may lie this far apart
 _ENCLOSED = 0.75  # the share of rays at eye height that must meet something: doors stand open, outside it is half
@@ -19,7 +19,7 @@ _EQUAL = 1e-3  # metres: less is rounding, which must not decide
 
 
 @dataclass(frozen=True)
-class StandingPoint:
+class CameraPlace:
     """A place for a camera."""
 
     eye: np.ndarray  # (3,) metres, in the scene's world
@@ -27,8 +27,8 @@ class StandingPoint:
 
 
 def floor_height(scene: MeshScene) -> float:
-    """The height of the floor: the lowest level with at least half as much level area as the largest such level in
-    the lower half of the scene. A house of several storeys gives its lowest."""
+    """Metres to the floor, in the scene's world: the lowest level with at least half as much level area as the largest
+    such level in the lower half of the scene. A house of several storeys gives its lowest. Raises InputError."""
     caster = scene.caster
     heights = scene.soup.corners[:, :, 2].mean(axis=1) - scene.origin[2]
     low, high = scene.bounds[:, 2]
@@ -41,23 +41,22 @@ def floor_height(scene: MeshScene) -> float:
     return float(np.average(heights[level][bins == floor], weights=caster.area[level][bins == floor]))
 
 
-def standing_point(scene: MeshScene, *, floor: float | None = None, eye_height: float = EYE_HEIGHT) -> StandingPoint:
+def find_camera_place(scene: MeshScene, *, floor: float | None = None, eye_height: float = EYE_HEIGHT) -> CameraPlace:
     """The place of most clearance on a grid over the scene, `eye_height` above `floor` (found if not given): floor
     straight below, something above, and around it walls. The same scene gives the same place; of equals, the middle.
     Raises InputError if there is no such place."""
     floor = floor_height(scene) if floor is None else floor
     eyes = _grid(scene, floor + eye_height)
-    eyes = eyes[_stands(scene, eyes, eye_height)]
+    eyes = eyes[_between_floor_and_roof(scene, eyes, eye_height)]
     if len(eyes):
         clearance, enclosed = _clearance(scene, eyes, eye_height)
         clearance[enclosed < _ENCLOSED] = 0
         if clearance.max() > 0:
             best = _middle(eyes, np.flatnonzero(clearance > clearance.max() - _EQUAL))
-            return StandingPoint(eyes[best], float(clearance[best]))
+            return CameraPlace(eyes[best], float(clearance[best]))
     mend = "check its scale and which axis is up, or give the floor's height"
-    raise InputError(
-        f"{scene.name} has no place to stand, {eye_height} m above {floor:.2f} m and between walls: {mend}"
-    )
+    place = f"{eye_height} m above {floor:.2f} m and between walls"
+    raise InputError(f"{scene.name} has no place to stand, {place}: {mend}")
 
 
 def _middle(eyes: np.ndarray, equals: np.ndarray) -> int:
@@ -69,13 +68,13 @@ def _middle(eyes: np.ndarray, equals: np.ndarray) -> int:
 def _grid(scene: MeshScene, height: float) -> np.ndarray:
     """(n, 3) places, row by row, half a step inside the bounds."""
     low, high = scene.bounds[:, :2]
-    counts = np.clip(((high - low) / _FINEST).astype(int), 1, _MOST)
+    counts = np.clip(((high - low) / _GRID_STEP).astype(int), 1, _GRID_SIZE)
     x, y = (l + (np.arange(n) + 0.5) * (h - l) / n for l, h, n in zip(low, high, counts, strict=True))
     places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     return np.concatenate([places, np.full((len(places), 1), height)], axis=1)
 
 
-def _stands(scene: MeshScene, eyes: np.ndarray, eye_height: float) -> np.ndarray:
+def _between_floor_and_roof(scene: MeshScene, eyes: np.ndarray, eye_height: float) -> np.ndarray:
     below, above = (scene.cast(eyes, np.tile([0.0, 0.0, way], (len(eyes), 1))) for way in (-1.0, 1.0))
     return (np.abs(below.distance - eye_height) < _ON_FLOOR) & (above.triangle >= 0)
 
@@ -89,6 +88,6 @@ def _clearance(scene: MeshScene, eyes: np.ndarray, eye_height: float) -> tuple[n
     for level in (*_LEVELS, eye_height):
         origins = np.repeat(eyes + np.array([0, 0, level - eye_height]), _AZIMUTHS, axis=0)
         hits = scene.cast(origins, rays)
-        reach = np.where(hits.triangle >= 0, hits.distance, np.inf).reshape(-1, _AZIMUTHS)
-        nearest = np.minimum(nearest, reach.min(axis=1))
-    return nearest, np.isfinite(reach).mean(axis=1)
+        free = np.where(hits.triangle >= 0, hits.distance, np.inf).reshape(-1, _AZIMUTHS)
+        nearest = np.minimum(nearest, free.min(axis=1))
+    return nearest, np.isfinite(free).mean(axis=1)
