@@ -1,4 +1,4 @@
-"""Accuracy against cost for every recipe and method measured on the same rooms: one PNG, and its points as JSON."""
+"""Charts of accuracy against cost, of every recipe and method measured on the same rooms: a PNG, and its points."""
 
 import io
 import json
@@ -10,7 +10,7 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_bytes, write_text
 from rein3d_jax.io.files.json_file import read_json
 
-COLOURS = ("#1f7a8c", "#c8553d", "#6a5acd", "#8a7a2a", "#2d6a4f", "#b5179e", "#555b6e", "#e09f3e")
+_COLOURS = ("#1f7a8c", "#c8553d", "#6a5acd", "#8a7a2a", "#2d6a4f", "#b5179e", "#555b6e", "#e09f3e")
 
 
 @dataclass(frozen=True)
@@ -48,21 +48,22 @@ class Point:
     on_front: bool = False
 
 
-def chart(files: list[Path], picture: Path) -> None:
-    """Draws the result files into `picture`, PNG, and writes what it shows beside it as NAME.chart.json. Raises
-    InputError without matplotlib, for files of different rooms, and for one that is no result of evaluate."""
+def chart(files: list[Path], picture: Path, points: Path | None = None) -> None:
+    """Draws the result files into `picture`, PNG, and writes what it shows into `points`, JSON. Raises InputError
+    without matplotlib, for files of different rooms, and for one that is no result of evaluate."""
     results = {path: _result(path) for path in files}
     rooms = {tuple(result["rooms"]) for result in results.values()}
     if len(rooms) > 1:
         raise InputError(f"--chart: {', '.join(map(str, files))} are of different rooms: evaluate all on the same")
     panels = [(panel, _points(panel, results)) for panel in PANELS]
-    panels = [(panel, points) for panel, points in panels if points]
+    panels = [(panel, shown) for panel, shown in panels if shown]
     if not panels:
         raise InputError(f"--chart: {', '.join(map(str, files))} hold no figures to draw: evaluate novel-views first")
     drawn = _png(panels, len(next(iter(rooms))))
-    table = [{**asdict(panel), "points": [asdict(point) for point in points]} for panel, points in panels]
     write_bytes(picture, drawn)
-    write_text(picture.with_suffix(".chart.json"), json.dumps({"rooms": rooms.pop(), "panels": table}, indent=1) + "\n")
+    if points is not None:
+        table = [{**asdict(panel), "points": [asdict(point) for point in shown]} for panel, shown in panels]
+        write_text(points, json.dumps({"rooms": rooms.pop(), "panels": table}, indent=1) + "\n")
 
 
 def _result(path: Path) -> dict:
@@ -96,7 +97,7 @@ def _png(panels: list[tuple[Panel, list[Point]]], rooms: int) -> bytes:
     rows = -(-len(panels) // 2)
     figure = Figure(figsize=(15, 4.6 * rows), layout="constrained")
     labels = {point.label: None for _, points in panels for point in points}
-    colours = {label: COLOURS[i % len(COLOURS)] for i, label in enumerate(labels)}
+    colours = {label: _COLOURS[i % len(_COLOURS)] for i, label in enumerate(labels)}
     axes = figure.subplots(rows, 2, squeeze=False).ravel()
     for axis, (panel, points) in zip(axes, panels, strict=False):
         _draw(axis, panel, points, colours)
@@ -134,7 +135,7 @@ def _label(axis, points: list[Point], unit: float, colours: dict[str, str]) -> N
     """Names in a column on the right, in the order of merit, each with a line to its point: none covers another."""
     low, high = axis.get_ylim()
     ranked = sorted(points, key=lambda p: p.merit)
-    heights = spread([(p.merit - low) / (high - low) for p in ranked], apart=0.065)
+    heights = spread_labels([(p.merit - low) / (high - low) for p in ranked], apart=0.065)
     for point, height in zip(ranked, heights, strict=True):
         axis.annotate(
             f"{point.label}  {point.merit:.3g}",
@@ -148,7 +149,7 @@ def _label(axis, points: list[Point], unit: float, colours: dict[str, str]) -> N
         )
 
 
-def spread(heights: list[float], apart: float) -> list[float]:
+def spread_labels(heights: list[float], apart: float) -> list[float]:
     """Ascending heights moved so that neighbours are `apart`, and as a whole no higher than the axes, 1."""
     placed = []
     for height in heights:

@@ -27,9 +27,9 @@ Figures = dict[str, float]
 Masks = Mapping[str, jax.Array]  # name -> (n, h, w) bool
 
 
-def pictures(shown: jax.Array, truth: jax.Array, masks: Masks, metres: np.ndarray, weights: Mapping) -> Figures:
-    """psnr, ssim and lpips of (n, h, w, 3) against (n, h, w, 3), taken `metres` (n,) from the input; `weights` are
-    those of LPIPS."""
+def picture_figures(shown: jax.Array, truth: jax.Array, masks: Masks, metres: np.ndarray, weights: Mapping) -> Figures:
+    """Figures psnr, ssim and lpips of (n, h, w, 3) against (n, h, w, 3), taken `metres` (n,) from the input; `weights`
+    are those of LPIPS."""
     each = {"psnr": _capped(psnr(shown, truth)), "ssim": ssim(shown, truth)}
     each["lpips"] = jnp.concatenate(
         [lpips(weights, *pair) for pair in zip(shown[:, None], truth[:, None], strict=True)]
@@ -44,8 +44,8 @@ def pictures(shown: jax.Array, truth: jax.Array, masks: Masks, metres: np.ndarra
     return _by_distance(each, metres) | _by_mask(split, masks) | shares
 
 
-def spheres(shown: jax.Array, truth: jax.Array, masks: Masks, metres: np.ndarray) -> Figures:
-    """ws_psnr, ws_ssim and seam of panoramas (n, h, 2 h, 3), pixels weighted by area; `seam_truth` beside them."""
+def sphere_figures(shown: jax.Array, truth: jax.Array, masks: Masks, metres: np.ndarray) -> Figures:
+    """Figures ws_psnr, ws_ssim and seam of panoramas (n, h, 2 h, 3), pixels weighted by area, and `seam_truth`."""
     each = {"ws_psnr": _capped(ws_psnr(shown, truth)), "ws_ssim": ws_ssim(shown, truth)}
     area = jnp.cos(latitudes(shown.shape[1]))[:, None]
     similar = _similar(*(jax.vmap(lambda one: pad_sphere(one, WINDOW // 2))(x) for x in (shown, truth)))
@@ -57,8 +57,8 @@ def spheres(shown: jax.Array, truth: jax.Array, masks: Masks, metres: np.ndarray
     return _by_distance(each, metres) | _by_mask(split, masks) | seams
 
 
-def distances(shown: jax.Array, truth: jax.Array, masks: Masks, metres: np.ndarray) -> Figures:
-    """abs_rel and delta_1.25 of panoramic distances (n, h, 2 h), 0 where unknown; a hole is an error of 1."""
+def distance_figures(shown: jax.Array, truth: jax.Array, masks: Masks, metres: np.ndarray) -> Figures:
+    """Figures abs_rel and delta_1.25 of panoramic distances (n, h, 2 h), 0 where unknown; a hole is an error of 1."""
     area = pixel_solid_angles(*truth.shape[1:])
 
     def errors(mask):

@@ -94,7 +94,8 @@ def _rays(camera: Camera) -> np.ndarray:
     if camera.model == EQUIRECTANGULAR:
         return rays_of_pose64(pose, _SAMPLES * camera.height)
     size = (_SAMPLES * camera.height, _SAMPLES * camera.width)
-    rays = np.asarray(pinhole_rays(*size, _SAMPLES * camera.focal, _SAMPLES * camera.centre), np.float64) @ pose[:3, :3].T
+    local = np.asarray(pinhole_rays(*size, _SAMPLES * camera.focal, _SAMPLES * camera.centre), np.float64)
+    rays = local @ pose[:3, :3].T
     return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
 
 

@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from experiments.evaluate.look import Look, filled_look, scene_look, with_panoramas
 from experiments.evaluate.mesh_warp import mesh_warp
-from experiments.evaluate.room import Room, timed, whole
-from experiments.reconstruct.__main__ import ReconstructConfig, reconstruct
+from experiments.evaluate.renderer import Renderer, filled_renderer, scene_renderer, with_panoramas
+from experiments.evaluate.room import EvaluationRoom, timed, whole
+from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.flythrough import FilmConfig
 from experiments.reconstruct.inputs import InputConfig
+from experiments.reconstruct.job import run_job
 from experiments.restorer_network import read_network
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.files.json_file import read_json
 from rein3d_jax.io.splats.ply import read_ply
 from rein3d_jax.restore import restorer
 from rein3d_jax.restore.restorer import DIFFUSION, LEARNED, METHODS, Restorer
@@ -29,15 +29,15 @@ OF_SCENES = (COARSE, *RESTORERS, MESH, REFINED)
 
 
 class Built(NamedTuple):
-    """A method, ready to be looked at."""
+    """A method, ready to render."""
 
-    look: Look
+    render: Renderer
     seconds: float  # from the panorama in memory to here
     size: dict[str, int]  # gaussians, or triangles
 
 
-def chosen(names: Sequence[str] | None, offered: Sequence[str]) -> list[str]:
-    """`names` that are among those `offered`, or all but the one whose weights do not come with the package. Raises
+def chosen_methods(names: Sequence[str] | None, offered: Sequence[str]) -> list[str]:
+    """Those of `names` that are `offered`, or all but the one whose weights do not come with the package. Raises
     InputError for one that no protocol knows."""
     for name in names or ():
         if name not in OF_SCENES:
@@ -45,8 +45,8 @@ def chosen(names: Sequence[str] | None, offered: Sequence[str]) -> list[str]:
     return [name for name in offered if (name != DIFFUSION if names is None else name in names)]
 
 
-def build(method: str, room: Room, cameras: Sequence[Camera], runs: Path) -> Built:
-    """`method` for a room, to be looked at from `cameras`. The refined scene is made by the main job in `runs`, which
+def build(method: str, room: EvaluationRoom, cameras: Sequence[Camera], runs: Path) -> Built:
+    """A method for a room, ready to render for `cameras`. The refined scene is made by the main job in `runs`, which
     takes minutes, or found finished there."""
     if method == MESH:
         mesh, seconds = timed(lambda: mesh_warp(whole(room.panorama)))
@@ -58,38 +58,38 @@ def build(method: str, room: Room, cameras: Sequence[Camera], runs: Path) -> Bui
     config = room.config.restore
     coarse = _of_scene(*room.coarse, room, with_panoramas(cameras, config.height))
     fill, seconds = fill_of(method, room)
-    look = filled_look(coarse.look, fill, rows=config.height, observed=config.observed, anchored=method in ANCHORED)
-    return coarse._replace(look=look, seconds=coarse.seconds + seconds)
+    anchored = method in ANCHORED
+    render = filled_renderer(coarse.render, fill, rows=config.height, observed=config.observed, anchored=anchored)
+    return coarse._replace(render=render, seconds=coarse.seconds + seconds)
 
 
-def fill_of(method: str, room: Room) -> tuple[Restorer, float]:
+def fill_of(method: str, room: EvaluationRoom) -> tuple[Restorer, float]:
     """The restorer of that name with the recipe's settings, and the seconds of what it knows beforehand."""
     background, seconds = room.background
     config = dataclasses.replace(room.config.restore, method=method)
     return restorer(config, background, read_network(config)), 0.0 if method in BLIND else seconds
 
 
-def _of_scene(gaussians: Gaussians, seconds: float, room: Room, cameras: Sequence[Camera]) -> Built:
-    look = scene_look(gaussians, cameras, room.config.rasterize)
-    return Built(look, seconds, {"gaussians": int(gaussians.alive.sum())})
+def _of_scene(gaussians: Gaussians, seconds: float, room: EvaluationRoom, cameras: Sequence[Camera]) -> Built:
+    render = scene_renderer(gaussians, cameras, room.config.rasterize)
+    return Built(render, seconds, {"gaussians": int(gaussians.alive.sum())})
 
 
-def _refined(room: Room, output: Path) -> tuple[Gaussians, float]:
+def _refined(room: EvaluationRoom, output: Path) -> tuple[Gaussians, float]:
     """The main job's scene and its seconds without the writing, compilation included: as a user waits for it."""
-    named = read_json(room.folder / "scene.json")["input"]
-    files = {"panorama": str(room.folder / named["rgb"]), "distance": str(room.folder / named["distance"])}
+    files = {"panorama": str(room.source.rgb), "distance": str(room.source.distance)}
     config: ReconstructConfig = dataclasses.replace(
         room.config,
         output=str(output),
         input=InputConfig(**files, views=None, height=room.config.input.height),
-        film=FilmConfig(width=16, height=16, step=10.0, turn=3.0),  # nobody looks at it
+        film=FilmConfig(width=16, height=16, step=10.0, turn=3.0),  # nobody watches it
     )
-    metrics = reconstruct(config, resume=True)
+    metrics = run_job(config, resume=True)
     seconds = sum(spent for stage, spent in metrics["seconds"].items() if stage not in ("write", "total"))
     return read_ply(output / "scene.ply"), seconds
 
 
 def recipe_of(config: ReconstructConfig) -> dict:
-    """What of a recipe a result depends on, for JSON: all but where the main job reads and writes."""
+    """The part of a recipe that a result depends on, for JSON: all but where the main job reads and writes."""
     table = dataclasses.asdict(config) | {"input": {"height": config.input.height}}
     return {name: json.loads(json.dumps(value)) for name, value in table.items() if name not in ("output", "film")}

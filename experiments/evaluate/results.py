@@ -1,4 +1,4 @@
-"""Figures over rooms: each room's are kept in a file of their own as soon as they are there, so that a run that was
+"""Figures over rooms: each room's are stored in a file of their own as soon as they are there, so that a run that was
 killed goes on; and the table of all, as the JSON file holds it."""
 
 import dataclasses
@@ -19,11 +19,11 @@ from rein3d_jax.evaluate.standard_error import over_rooms
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.files.json_file import read_json
 
-LAYOUT = 1  # of a kept file; count up when a figure changes its meaning
+LAYOUT = 1  # of a stored file; count up when a figure changes its meaning
 
 
-def kept(file: Path, depends: dict, make: Callable[[], Outcome]) -> tuple[Outcome, bool]:
-    """The outcome in `file` if it was made from the very same `depends`, and True; else made and kept, and False."""
+def stored_outcome(file: Path, depends: dict, make: Callable[[], Outcome]) -> tuple[Outcome, bool]:
+    """The outcome in `file` if it was made from the very same `depends`, and True; else made and stored, and False."""
     wanted = {**depends, "layout": LAYOUT, "version": __version__}
     key = hashlib.sha256(json.dumps(wanted, sort_keys=True).encode()).hexdigest()
     found = _read(file, key)

@@ -1,4 +1,4 @@
-"""Rooms with ground truth: where they lie, and what all methods start from in each, made once."""
+"""Rooms to evaluate on: where their files lie, and what all methods start from in each, made once."""
 
 import hashlib
 import re
@@ -13,45 +13,60 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from experiments.reconstruct.__main__ import ReconstructConfig
+from experiments.reconstruct.config import ReconstructConfig
 from rein3d_jax.depth.complete import complete_distance
 from rein3d_jax.errors import InputError
+from rein3d_jax.io.files.json_file import read_json
 from rein3d_jax.io.pictures.image import resize_panorama
+from rein3d_jax.io.rooms.panorama_sets import panorama_sets
+from rein3d_jax.io.rooms.posed_panorama import read_rgbd_panorama
 from rein3d_jax.io.rooms.traced_room import TracedRoom, read_traced_room
 from rein3d_jax.pipeline.pairs import PairConfig, degrade
-from rein3d_jax.pipeline.pipeline import lift_scene, room_background
+from rein3d_jax.pipeline.survey import lift_scene, room_background
 from rein3d_jax.restore import Background
 from rein3d_jax.scene import Gaussians, Panorama, Video
 
 Made = TypeVar("Made")
 
 
-def room_folders(folder: str | Path, limit: int | None = None) -> list[Path]:
-    """The folders in `folder` that hold a scene.json, room2 before room10; or `folder` itself if it holds one.
-    Raises InputError if there is none."""
+@dataclass(frozen=True)
+class RoomSource:
+    """Where a room's files lie: its panorama's, and the scene.json of its ground truth where it has one."""
+
+    name: str
+    rgb: Path
+    distance: Path
+    truth: Path | None = None
+
+    def digest(self) -> str:
+        """The hash of all that the room's files hold."""
+        digest = hashlib.sha256()
+        folder = self.rgb.parent if self.truth is None else self.truth.parent
+        files = [self.rgb, self.distance] if self.truth is None else sorted(folder.rglob("*"))
+        for path in filter(Path.is_file, files):
+            digest.update(f"{path.relative_to(folder)}\0{path.stat().st_size}\0".encode() + path.read_bytes())
+        return digest.hexdigest()
+
+
+def room_sources(folder: str | Path, limit: int | None = None) -> list[RoomSource]:
+    """The rooms in `folder`, room2 before room10: folders with a scene.json, or `folder` itself if it holds one; else
+    panoramas without ground truth (panorama_sets). Raises InputError if there are none, or at a damaged scene.json."""
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder: give --rooms the one that holds the rooms")
-    if (folder / "scene.json").exists():
-        return [folder]
-    found = sorted((path.parent for path in folder.glob("*/scene.json")), key=_natural)[:limit]
-    if not found:
-        raise InputError(
-            f"{folder} holds no room: --rooms needs folders with a scene.json, as ../shared/rooms has them"
-        )
-    return found
+    scene = folder / "scene.json"
+    scenes = [scene] if scene.exists() else sorted(folder.glob("*/scene.json"), key=_natural)[:limit]
+    return [_with_truth(scene) for scene in scenes] or [RoomSource(*files) for files in panorama_sets(folder)[:limit]]
+
+
+def _with_truth(scene: Path) -> RoomSource:
+    read_traced_room(scene)  # a damaged room is found before the long part
+    named = read_json(scene)["input"]
+    return RoomSource(scene.parent.resolve().name, *(scene.parent / named[kind] for kind in ("rgb", "distance")), scene)
 
 
 def _natural(path: Path) -> list:
-    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)]
-
-
-def fingerprint(folder: Path) -> str:
-    """What the room's files hold, as one hash."""
-    digest = hashlib.sha256()
-    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
-        digest.update(f"{path.relative_to(folder)}\0{path.stat().st_size}\0".encode() + path.read_bytes())
-    return digest.hexdigest()
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.parent.name)]
 
 
 def timed(make: Callable[[], Made], *, again: bool = True) -> tuple[Made, float]:
@@ -64,21 +79,26 @@ def timed(make: Callable[[], Made], *, again: bool = True) -> tuple[Made, float]
 
 
 @dataclass(frozen=True)
-class Room:
-    """A room under test, at the sizes that the recipe works at. All that is made of it is made when first asked for."""
+class EvaluationRoom:
+    """A room to evaluate on, at the sizes that the recipe works at; what is made of it is made when first asked for."""
 
-    folder: Path
+    source: RoomSource
     config: ReconstructConfig
 
     @property
     def name(self) -> str:
-        """The folder's."""
-        return self.folder.resolve().name
+        """That of its source."""
+        return self.source.name
 
     @cached_property
     def traced(self) -> TracedRoom:
-        """What its folder holds. Raises InputError as read_traced_room does."""
-        return read_traced_room(self.folder)
+        """The room with its ground truth. Raises InputError as read_traced_room does."""
+        return read_traced_room(self.source.truth)
+
+    @cached_property
+    def given(self) -> Panorama:
+        """The input as its files hold it."""
+        return read_rgbd_panorama(self.source.rgb, self.source.distance)
 
     @cached_property
     def panorama(self) -> Panorama:
@@ -109,7 +129,7 @@ class Room:
     def clip_rgb(self) -> jax.Array:
         """(t, h, w, 3) the clean video. Raises InputError if the room has none."""
         if len(self.traced.video) < 2:
-            raise InputError(f"{self.folder}/scene.json has no video of two frames: leave out --protocol restoration")
+            raise InputError(f"{self.source.truth} has no video of two frames: leave out --protocol restoration")
         return jnp.stack([frame.rgb for frame in self.traced.video])
 
     @cached_property
@@ -121,8 +141,7 @@ class Room:
         return timed(lambda: degrade(placed, poses, config=config))
 
     def _input_at(self, height: int) -> Panorama:
-        given = self.traced.input.panorama
-        pictures = (np.asarray(x) for x in (given.rgb, given.distance, given.valid))
+        pictures = (np.asarray(x) for x in (self.given.rgb, self.given.distance, self.given.valid))
         rgb, distance, valid = (jnp.asarray(x) for x in resize_panorama(*pictures, height))
         return Panorama(rgb, complete_distance(distance, valid, config=self.config.depth), valid)
 

@@ -9,7 +9,7 @@ import pytest
 
 from experiments.evaluate import __main__ as evaluate
 from experiments.evaluate import protocols
-from experiments.evaluate.room import room_folders
+from experiments.evaluate.room import room_sources
 
 RECIPE = """
 [input]
@@ -109,8 +109,8 @@ def test_figures_are_plausible(finished):
 def test_goes_on_where_it_was_killed(finished, recipe, rooms, tmp_path, monkeypatch):
     folder, before = finished
     shutil.copytree(folder / "work", tmp_path / "work")
-    (kept,) = (tmp_path / "work").glob("*/restoration/room10/telea.json")
-    kept.write_text(kept.read_text()[:100])  # killed in the middle of an unsafe write
+    (broken,) = (tmp_path / "work").glob("*/restoration/room10/telea.json")
+    broken.write_text(broken.read_text()[:100])  # killed in the middle of an unsafe write
     (gone,) = (tmp_path / "work").glob("*/novel_views/room2/coarse.json")
     gone.unlink()
     made = []
@@ -149,9 +149,23 @@ def test_another_recipe_is_measured_anew(finished, recipe, rooms, tmp_path, monk
 
 
 def test_rooms_in_the_order_of_their_numbers(rooms, tmp_path):
-    assert [path.name for path in room_folders(rooms)] == ["room2", "room10"]
-    assert [path.name for path in room_folders(rooms, 1)] == ["room2"]
-    assert room_folders(rooms / "room2") == [rooms / "room2"]
+    assert [room.name for room in room_sources(rooms)] == ["room2", "room10"]
+    assert [room.name for room in room_sources(rooms, 1)] == ["room2"]
+    (one,) = room_sources(rooms / "room2")
+    assert one.truth == rooms / "room2" / "scene.json" and one.rgb == rooms / "room2" / "input.png"
+
+
+def test_panoramas_alone_are_measured_without_reference(recipe, rooms, tmp_path, capsys):
+    for name in ("input.png", "input_distance.exr"):
+        (tmp_path / "own").mkdir(exist_ok=True)
+        shutil.copy(rooms / "room2" / name, tmp_path / "own" / name)
+    code, _ = run(recipe, tmp_path / "own", tmp_path, "--methods", "coarse")
+    assert code == 2 and "without ground truth: give --protocol no-reference" in capsys.readouterr().err
+    code, own = run(recipe, tmp_path / "own", tmp_path, "--methods", "coarse", "--protocol", "no-reference")
+    code2, room = run(recipe, rooms / "room2", tmp_path, "--methods", "coarse", "--protocol", "no-reference")
+    assert code == code2 == 0 and own["rooms"] == ["input"]
+    both = [result["no_reference"]["coarse"] for result in (own, room)]
+    assert all(both[0][name]["mean"] == both[1][name]["mean"] for name in ("niqe", "brisque", "coverage"))
 
 
 def no_file(name):
@@ -161,7 +175,7 @@ def no_file(name):
 
 FAULTS = {
     "no folder": (None, ("--rooms", "nowhere"), "nowhere is no folder"),
-    "no rooms": (None, ("--rooms", "."), "holds no room"),
+    "no rooms": (None, ("--rooms", "."), "holds no panorama"),
     "method": (None, ("--methods", "magic"), '"magic" is unknown; choose from coarse'),
     "protocol": (None, ("--protocol", "novel"), '"novel" is unknown; choose from restoration, novel-views'),
     "method of another": (None, ("--protocol", "restoration", "--methods", "refined"), "has only the methods coarse"),

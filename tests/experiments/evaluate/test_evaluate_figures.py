@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from experiments.evaluate import __main__ as evaluate
-from experiments.evaluate import measure
-from experiments.evaluate.chart import spread
+from experiments.evaluate.chart import spread_labels
+from experiments.evaluate.measure import BEST_PSNR, distance_figures, picture_figures, sphere_figures
 from experiments.evaluate.pareto import pareto_front
 from rein3d_jax.io.weights.metric_weights import lpips_weights
 
@@ -28,33 +28,32 @@ def masks():
 
 
 def test_a_perfect_method_has_the_best_values(truth, masks):
-    figures = measure.pictures(truth, truth, masks, METRES, lpips_weights()) | measure.spheres(
-        truth, truth, masks, METRES
-    )
+    figures = picture_figures(truth, truth, masks, METRES, lpips_weights())
+    figures |= sphere_figures(truth, truth, masks, METRES)
     for name in ("psnr", "psnr_hole", "psnr_at_2-3m", "ws_psnr", "ws_psnr_observed"):
-        assert figures[name] == measure.BEST_PSNR
+        assert figures[name] == BEST_PSNR
     for name in ("ssim", "ssim_hole", "ws_ssim", "ws_ssim_hole"):
         assert figures[name] == pytest.approx(1, abs=1e-5)  # float32 sums
     assert figures["lpips"] == pytest.approx(0, abs=1e-6) and figures["seam"] == figures["seam_truth"]
     assert np.isnan(figures["psnr_never_seen"]) and np.isnan(figures["psnr_at_3m+"])
     distance = jnp.full((3, 32, 64), 2.0)
-    figures = measure.distances(distance, distance, masks, METRES)
+    figures = distance_figures(distance, distance, masks, METRES)
     assert figures["abs_rel"] == figures["abs_rel_hole"] == 0 and figures["delta_1.25"] == 1
 
 
 def test_splits_by_hand(truth, masks):
     """An error of 0.1 within the hole alone is 20 dB there, and less over a whole picture by its share."""
     shown = truth + 0.1 * masks["hole"][..., None]
-    figures = measure.pictures(shown, truth, masks, METRES, lpips_weights())
+    figures = picture_figures(shown, truth, masks, METRES, lpips_weights())
     assert figures["psnr_hole"] == pytest.approx(20, abs=1e-3)  # float32
-    assert figures["psnr_observed"] == figures["psnr_at_0-0.5m"] == measure.BEST_PSNR
+    assert figures["psnr_observed"] == figures["psnr_at_0-0.5m"] == BEST_PSNR
     share = 8 * 20 / (32 * 64)
     assert figures["psnr_at_0.5-1m"] == pytest.approx(20 - 10 * np.log10(share), abs=1e-3)
     assert figures["psnr"] == pytest.approx((100 + 2 * (20 - 10 * np.log10(share))) / 3, abs=1e-3)
     assert figures["share_hole"] == pytest.approx(share * 2 / 3, rel=1e-6)
     assert figures["ssim_hole"] < figures["ssim_observed"]
     distance = jnp.full((3, 32, 64), 2.0)
-    figures = measure.distances(jnp.where(masks["hole"], 3.0, 2.0), distance, masks, METRES)
+    figures = distance_figures(jnp.where(masks["hole"], 3.0, 2.0), distance, masks, METRES)
     assert figures["abs_rel_hole"] == pytest.approx(0.5) and figures["abs_rel_observed"] == 0
     assert figures["delta_1.25_hole"] == 0 and figures["delta_1.25_observed"] == 1
 
@@ -72,13 +71,13 @@ def test_the_front_is_what_none_beats():
         for i, point in enumerate(points):
             assert (i in front) == (not any(beats(points[j], point) for j in front))
             assert i not in front or not any(beats(other, point) for other in points)
-        kept = [points[i] for i in front]
-        assert kept == sorted(kept) and [y for _, y in kept] == sorted(y for _, y in kept)
+        along = [points[i] for i in front]
+        assert along == sorted(along) and [y for _, y in along] == sorted(y for _, y in along)
     assert pareto_front([]) == []
 
 
 def test_labels_keep_apart():
-    placed = spread([0.1, 0.11, 0.5, 0.99, 1.0], apart=0.1)
+    placed = spread_labels([0.1, 0.11, 0.5, 0.99, 1.0], apart=0.1)
     assert min(np.diff(placed)) >= 0.1 - 1e-9 and max(placed) <= 1
 
 
@@ -95,9 +94,10 @@ def result(file, rooms=("a", "b"), recipe="quick", psnr=20.0, seconds=2.0):
 def test_chart(tmp_path):
     pytest.importorskip("matplotlib", reason="of the bench extra")
     files = [result(tmp_path / "one.json"), result(tmp_path / "two.json", recipe="paper", psnr=25.0, seconds=60.0)]
-    assert evaluate.main(["--chart", *files]) == 0
+    points = tmp_path / "points.json"
+    assert evaluate.main(["--chart", *files, "--points", str(points)]) == 0
     assert (tmp_path / "one.png").read_bytes().startswith(b"\x89PNG")
-    table = json.loads((tmp_path / "one.chart.json").read_text())
+    table = json.loads(points.read_text())
     by_seconds, by_gaussians = table["panels"]  # the others have no figures
     on_front = {point["label"] for point in by_seconds["points"] if point["on_front"]}
     assert len(by_seconds["points"]) == 4 and on_front == {"coarse (quick)", "coarse (paper)"}

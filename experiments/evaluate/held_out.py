@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from experiments.evaluate.room import Room
+from experiments.evaluate.room import EvaluationRoom
 from experiments.reconstruct.quality import AT_ORIGIN, is_novel
 from rein3d_jax.errors import InputError
 from rein3d_jax.evaluate.inverse_distance import sample_inverse_distance
@@ -20,18 +20,18 @@ from rein3d_jax.io.rooms.posed_panorama import PosedPanorama
 from rein3d_jax.io.rooms.traced_room import View
 from rein3d_jax.scene import Camera
 
-UNKNOWN = -1  # the region of a pixel whose true distance the room does not tell
+_UNKNOWN = -1  # the region of a pixel whose true distance the room does not tell
 
 
 @dataclass(frozen=True)
-class Target:
-    """A picture to be met."""
+class HeldOutPicture:
+    """A picture that methods are measured against."""
 
     kind: Literal["origin", "view", "panorama"]  # origin: a view from the input's own place
     rgb: jax.Array  # (h, w, 3) sRGB
     camera: Camera
     distance: jax.Array | None  # (h, w) true metres, 0 where unknown; None where nothing is known
-    region: jax.Array  # (h, w) evaluate.regions' codes, or UNKNOWN
+    region: jax.Array  # (h, w) evaluate.regions' codes, or _UNKNOWN
 
     @property
     def metres(self) -> float:
@@ -40,15 +40,15 @@ class Target:
 
 
 @lru_cache(maxsize=1)  # every method of a room asks for them
-def targets(room: Room) -> list[Target]:
+def held_out_pictures(room: EvaluationRoom) -> list[HeldOutPicture]:
     """All views and panoramas of a room. Raises InputError if it has neither."""
     traced = room.traced
     if not traced.panos and not any(map(is_novel, traced.views)):
-        raise InputError(f"{room.folder}/scene.json has no views or panos from elsewhere: novel-views has no targets")
+        raise InputError(f"{room.source.truth} has no views or panos from elsewhere: novel-views needs them")
     return [*(_view(room, view) for view in traced.views), *(_panorama(room, pano) for pano in traced.panos)]
 
 
-def _view(room: Room, view: View) -> Target:
+def _view(room: EvaluationRoom, view: View) -> HeldOutPicture:
     """A view's true distance is that of the panorama at the same place, where the room has one."""
     position = np.asarray(view.camera.world_from_camera)[:3, 3]
     places = [
@@ -56,22 +56,23 @@ def _view(room: Room, view: View) -> Target:
     ]
     kind = "view" if is_novel(view) else "origin"
     if kind == "origin" or not places:
-        unknown = jnp.full(view.rgb.shape[:2], UNKNOWN)
-        return Target(kind, jnp.asarray(view.rgb), view.camera, None, unknown)
+        unknown = jnp.full(view.rgb.shape[:2], _UNKNOWN)
+        return HeldOutPicture(kind, jnp.asarray(view.rgb), view.camera, None, unknown)
     rays = _pinhole_rays(view.camera)
     distance = _distance_at(places[0], rays)
-    return Target(kind, jnp.asarray(view.rgb), view.camera, distance, _region(room, view.camera, rays, distance))
+    region = _region(room, view.camera, rays, distance)
+    return HeldOutPicture(kind, jnp.asarray(view.rgb), view.camera, distance, region)
 
 
-def _panorama(room: Room, pano: PosedPanorama) -> Target:
+def _panorama(room: EvaluationRoom, pano: PosedPanorama) -> HeldOutPicture:
     rgb, pose = pano.panorama.rgb, jnp.asarray(pano.world_from_camera, jnp.float32)
     camera = equirectangular_camera(pose, len(rgb))
     distance = jnp.where(pano.panorama.valid, pano.panorama.distance, 0.0)
     region = _region(room, camera, rays_of_pose(pose, *distance.shape), distance)
-    return Target("panorama", rgb, camera, distance, region)
+    return HeldOutPicture("panorama", rgb, camera, distance, region)
 
 
-def _region(room: Room, camera: Camera, rays: jax.Array, distance: jax.Array) -> jax.Array:
+def _region(room: EvaluationRoom, camera: Camera, rays: jax.Array, distance: jax.Array) -> jax.Array:
     return split(room.panorama, camera.world_from_camera[:3, 3], rays, distance)
 
 
@@ -85,7 +86,7 @@ def _pinhole_rays(camera: Camera) -> jax.Array:
 def _distance_at(pano: PosedPanorama, rays: jax.Array) -> jax.Array:
     """The panorama's distance along world rays, 0 where unknown. Interpolated in inverse distance, which is right on
     planes: the nearest pixel's is 7 % off on a floor seen at 10 degrees, far beyond what tells regions apart."""
-    turn = jnp.asarray(pano.world_from_camera[:3, :3], jnp.float32) @ world_from_camera_axes().T
-    local = jnp.matmul(rays, turn, precision=jax.lax.Precision.HIGHEST)
+    rotation = jnp.asarray(pano.world_from_camera[:3, :3], jnp.float32) @ world_from_camera_axes().T
+    local = jnp.matmul(rays, rotation, precision=jax.lax.Precision.HIGHEST)
     inverse, known = sample_inverse_distance(jnp.where(pano.panorama.valid, pano.panorama.distance, 0.0), local)
     return jnp.where(known, 1 / jnp.where(known, inverse, 1.0), 0.0)
