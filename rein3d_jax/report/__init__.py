@@ -1,1 +1,1 @@
-"""What a person looks at: the report, its charts and floor plan, the viewer page. Data in, text out."""
+"""Pages for a person: the report, its charts and floor map, the viewer page. Data in, text out."""

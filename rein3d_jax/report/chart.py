@@ -1,12 +1,13 @@
 """Curves as inline SVG, with ticks and axis labels, for a page that loads nothing from elsewhere."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from html import escape
 
 import numpy as np
 
-COLOURS = ("#1f7a8c", "#c8553d", "#6a5acd", "#8a7a2a")
+CURVE_COLOURS = ("#1f7a8c", "#c8553d", "#6a5acd", "#8a7a2a")
 MAX_POINTS = 400  # more are finer than a screen's pixels
 WIDTH, HEIGHT = 480, 290
 LEFT, RIGHT, TOP, BOTTOM = 62, 455, 12, 240  # the frame of the axes
@@ -32,7 +33,7 @@ class Chart:
 
 
 def line_chart(chart: Chart) -> str:
-    """The chart as SVG and a legend; says so where there is nothing to draw."""
+    """SVG of the chart and a legend, or a sentence where there is nothing to draw."""
     curves = [_thinned(series) for series in chart.series]
     if not sum(len(points) for points in curves):
         return "<p>Nothing was measured.</p>"
@@ -46,9 +47,34 @@ def line_chart(chart: Chart) -> str:
 
 
 def legend(entries: list[tuple[str, str]]) -> str:
-    """Names with a swatch of their colour each."""
+    """HTML list of names, each with a swatch of its colour."""
     items = (f'<li><i style="background:{colour}"></i>{escape(label)}</li>' for label, colour in entries)
     return f'<ul class="legend">{"".join(items)}</ul>'
+
+
+Ticks = Iterable[tuple[float, float]]  # (where it stands on the page, its number)
+
+
+def axes(across: Ticks, up: Ticks, labels: tuple[str, str], *, grid: bool = False) -> str:
+    """SVG of both axes with their labels (x, y) and horizontal lines; with `grid` vertical ones as well."""
+    x_label, y_label = map(escape, labels)
+    middle_x, middle_y = (LEFT + RIGHT) / 2, (TOP + BOTTOM) / 2
+    parts = [
+        f'<path class="grid" d="M{x:.1f} {TOP}V{BOTTOM}"/>' * grid
+        + f'<text x="{x:.1f}" y="{BOTTOM + 18}" text-anchor="middle">{tick:.6g}</text>'
+        for x, tick in across
+    ]
+    parts += [
+        f'<path class="grid" d="M{LEFT} {y:.1f}H{RIGHT}"/>'
+        f'<text x="{LEFT - 7}" y="{y + 4:.1f}" text-anchor="end">{tick:.6g}</text>'
+        for y, tick in up
+    ]
+    parts += [
+        f'<path class="axis" d="M{LEFT} {TOP}V{BOTTOM}H{RIGHT}"/>',
+        f'<text x="{middle_x}" y="{HEIGHT - 10}" text-anchor="middle">{x_label}</text>',
+        f'<text transform="translate(14 {middle_y}) rotate(-90)" text-anchor="middle">{y_label}</text>',
+    ]
+    return "".join(parts)
 
 
 def nice_ticks(low: float, high: float) -> np.ndarray:
@@ -82,18 +108,7 @@ def _place(values: np.ndarray, ticks: np.ndarray, start: float, end: float) -> n
 def _axes(chart: Chart, x_ticks: np.ndarray, y_ticks: np.ndarray) -> str:
     across = zip(_place(x_ticks, x_ticks, LEFT, RIGHT), x_ticks, strict=True)
     up = zip(_place(y_ticks, y_ticks, BOTTOM, TOP), y_ticks, strict=True)
-    parts = [f'<text x="{x:.1f}" y="{BOTTOM + 18}" text-anchor="middle">{tick:.6g}</text>' for x, tick in across] + [
-        f'<path class="grid" d="M{LEFT} {y:.1f}H{RIGHT}"/>'
-        f'<text x="{LEFT - 7}" y="{y + 4:.1f}" text-anchor="end">{tick:.6g}</text>'
-        for y, tick in up
-    ]
-    middle_x, middle_y = (LEFT + RIGHT) / 2, (TOP + BOTTOM) / 2
-    parts += [
-        f'<path class="axis" d="M{LEFT} {TOP}V{BOTTOM}H{RIGHT}"/>',
-        f'<text x="{middle_x}" y="{HEIGHT - 10}" text-anchor="middle">{escape(chart.x_label)}</text>',
-        f'<text transform="translate(14 {middle_y}) rotate(-90)" text-anchor="middle">{escape(chart.y_label)}</text>',
-    ]
-    return "".join(parts)
+    return axes(across, up, (chart.x_label, chart.y_label))
 
 
 def _curve(points: np.ndarray, x_ticks: np.ndarray, y_ticks: np.ndarray, index: int) -> str:
@@ -105,4 +120,4 @@ def _curve(points: np.ndarray, x_ticks: np.ndarray, y_ticks: np.ndarray, index: 
 
 
 def _colour(index: int) -> str:
-    return COLOURS[index % len(COLOURS)]
+    return CURVE_COLOURS[index % len(CURVE_COLOURS)]

@@ -15,7 +15,7 @@ VIRIDIS = np.array(
         [0xFD, 0xE7, 0x25],
     ]
 )
-UNKNOWN = 0.75
+_UNKNOWN = 0.75  # grey
 
 
 def colour_range(distance: np.ndarray, valid: np.ndarray) -> tuple[float, float]:
@@ -33,4 +33,4 @@ def colour_map(distance: np.ndarray, valid: np.ndarray, near: float, far: float)
     share = (np.where(valid, distance, near) - near) / max(far - near, np.finfo(np.float32).eps)
     stops = np.linspace(0, 1, len(VIRIDIS))
     rgb = np.stack([np.interp(share, stops, channel) for channel in VIRIDIS.T / 255], axis=-1)
-    return np.where(valid[..., None], rgb, UNKNOWN).astype(np.float32)
+    return np.where(valid[..., None], rgb, _UNKNOWN).astype(np.float32)

@@ -1,4 +1,4 @@
-"""A run told to someone who has never seen the code, as one HTML page that asks nothing of the network.
+"""A run's report for someone who has never seen the code: one HTML page that asks nothing of the network.
 
 Pure: the pictures come in encoded, the page goes out as text. All text is escaped; a policy in the page forbids
 every request."""
@@ -11,12 +11,12 @@ from typing import Any
 
 from rein3d_jax.report.chart import Chart, line_chart
 from rein3d_jax.report.colour_map import VIRIDIS
-from rein3d_jax.report.plan import Plan, floor_plan
+from rein3d_jax.report.floor_map import FloorMap, render_floor_map
 from rein3d_jax.report.scatter import Scatter, scatter_chart
 from rein3d_jax.report.style import STYLE
 
-SIGNATURES = {b"\xff\xd8\xff": "image/jpeg", b"\x89PNG": "image/png"}
-POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+_SIGNATURES = {b"\xff\xd8\xff": "image/jpeg", b"\x89PNG": "image/png"}
+_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 
 
 @dataclass(frozen=True)
@@ -70,23 +70,31 @@ class Report:
     warnings: tuple[str, ...] = ()
     parts: tuple[Section | Comparison, ...] = ()
     standing: Scatter | None = None  # this run among what was measured before
-    plan: Plan | None = None
+    floor_map: FloorMap | None = None
     charts: tuple[Chart, ...] = ()
     tables: tuple[Table, ...] = ()
     sources: tuple[str, ...] = ()  # whose pictures, under which licence
 
 
 def render_report(report: Report) -> str:
-    """The whole page. Raises ValueError for a picture that is neither JPEG nor PNG."""
+    """HTML of the whole page. Raises ValueError as picture_uri does."""
     title = escape(report.title)
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
         f'<meta name="viewport" content="width=device-width,initial-scale=1"><style>{STYLE}</style></head>'
         f"<body><main><h1>{title}</h1><p>{escape(report.summary)}</p>{_facts(report)}{_warnings(report.warnings)}"
-        f"{_each(_part, report.parts)}{_standing(report.standing)}{_plan(report.plan)}"
+        f"{_each(_part, report.parts)}{_standing(report.standing)}{_floor_map(report.floor_map)}"
         f"{_charts(report.charts)}{_each(_table, report.tables)}{_sources(report.sources)}</main></body></html>\n"
     )
+
+
+def picture_uri(picture: Picture) -> str:
+    """The picture as a data: address. Raises ValueError where it is neither JPEG nor PNG."""
+    media = next((name for start, name in _SIGNATURES.items() if picture.data.startswith(start)), None)
+    if media is None:
+        raise ValueError(f"the picture {picture.label!r} is neither JPEG nor PNG")
+    return f"data:{media};base64,{base64.b64encode(picture.data).decode()}"
 
 
 def _each(render: Callable[[Any], str], things: Iterable) -> str:
@@ -138,19 +146,15 @@ def _slider(comparison: Comparison) -> str:
 
 
 def _image(picture: Picture, kind: str = "") -> str:
-    media = next((name for start, name in SIGNATURES.items() if picture.data.startswith(start)), None)
-    if media is None:
-        raise ValueError(f"the picture {picture.label!r} is neither JPEG nor PNG")
-    code = base64.b64encode(picture.data).decode("ascii")
     style = f' class="{kind}"' if kind else ""
-    return f'<img{style} alt="{escape(picture.label)}" src="data:{media};base64,{code}">'
+    return f'<img{style} alt="{escape(picture.label)}" src="{picture_uri(picture)}">'
 
 
-def _plan(plan: Plan | None) -> str:
-    if plan is None:
+def _floor_map(floor_map: FloorMap | None) -> str:
+    if floor_map is None:
         return ""
-    caption = "Seen from the ceiling. One square of the grid is one metre."
-    return f'<section><h2>Where the camera went</h2><p class="quiet">{caption}</p>{floor_plan(plan)}</section>'
+    caption = '<p class="quiet">Seen from the ceiling. One square of the grid is one metre.</p>'
+    return f"<section><h2>Where the camera went</h2>{caption}{render_floor_map(floor_map)}</section>"
 
 
 def _standing(scatter: Scatter | None) -> str:
@@ -162,10 +166,7 @@ def _standing(scatter: Scatter | None) -> str:
 
 
 def _charts(charts: tuple[Chart, ...]) -> str:
-    figures = _each(
-        lambda chart: f"<figure><h3>{escape(chart.title)}</h3>{line_chart(chart)}</figure>",
-        charts,
-    )
+    figures = _each(lambda chart: f"<figure><h3>{escape(chart.title)}</h3>{line_chart(chart)}</figure>", charts)
     return f'<section><h2>How it learned</h2><div class="row wide">{figures}</div></section>' if figures else ""
 
 

@@ -6,9 +6,9 @@ from html import escape
 
 import numpy as np
 
-from rein3d_jax.report.chart import BOTTOM, COLOURS, HEIGHT, LEFT, RIGHT, TOP, WIDTH, legend, nice_ticks
+from rein3d_jax.report.chart import BOTTOM, CURVE_COLOURS, HEIGHT, LEFT, RIGHT, TOP, WIDTH, axes, legend, nice_ticks
 
-OWN = "#23303a"
+_OWN = "#23303a"
 
 
 @dataclass(frozen=True)
@@ -33,18 +33,20 @@ class Scatter:
 
 
 def scatter_chart(scatter: Scatter) -> str:
-    """The chart as SVG and a legend; says so where there is nothing to draw."""
+    """SVG of the chart and a legend, or a sentence where there is nothing to draw."""
     marks = [mark for mark in scatter.marks if _drawable(mark)]
     merits = [mark.merit for mark in marks if mark.merit is not None]
     if not merits:
         return "<p>Nothing was measured.</p>"
     across = cost_ticks([mark.cost for mark in marks])
     up = nice_ticks(min(merits) - 0.5, max(merits) + 0.5)
-    colours = [OWN if mark.own else COLOURS[i % len(COLOURS)] for i, mark in enumerate(marks)]
+    colours = [_OWN if mark.own else CURVE_COLOURS[i % len(CURVE_COLOURS)] for i, mark in enumerate(marks)]
+    places = [(_x(tick, across), tick) for tick in across], [(_y(tick, up), tick) for tick in up]
+    frame = axes(*places, (scatter.cost_label, scatter.merit_label), grid=True)
     drawn = "".join(_mark(mark, colour, across, up) for mark, colour in zip(marks, colours, strict=True))
     label = escape(f"{scatter.title}: {scatter.merit_label} by {scatter.cost_label}")
     return (
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{label}">{_axes(scatter, across, up)}{drawn}</svg>'
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{label}">{frame}{drawn}</svg>'
         + legend([(_legend_text(mark), colour) for mark, colour in zip(marks, colours, strict=True)])
     )
 
@@ -82,23 +84,3 @@ def _mark(mark: Mark, colour: str, across: np.ndarray, up: np.ndarray) -> str:
         return f'<path d="M{x:.1f} {TOP}V{BOTTOM}" stroke="{colour}" stroke-width="2.5" stroke-dasharray="6 4"/>'
     radius = 8 if mark.own else 5
     return f'<circle cx="{x:.1f}" cy="{_y(mark.merit, up):.1f}" r="{radius}" fill="{colour}"/>'
-
-
-def _axes(scatter: Scatter, across: np.ndarray, up: np.ndarray) -> str:
-    parts = [
-        f'<path class="grid" d="M{_x(tick, across):.1f} {TOP}V{BOTTOM}"/>'
-        f'<text x="{_x(tick, across):.1f}" y="{BOTTOM + 18}" text-anchor="middle">{tick:.6g}</text>'
-        for tick in across
-    ] + [
-        f'<path class="grid" d="M{LEFT} {_y(tick, up):.1f}H{RIGHT}"/>'
-        f'<text x="{LEFT - 7}" y="{_y(tick, up) + 4:.1f}" text-anchor="end">{tick:.6g}</text>'
-        for tick in up
-    ]
-    middle_x, middle_y = (LEFT + RIGHT) / 2, (TOP + BOTTOM) / 2
-    names = escape(scatter.cost_label), escape(scatter.merit_label)
-    parts += [
-        f'<path class="axis" d="M{LEFT} {TOP}V{BOTTOM}H{RIGHT}"/>',
-        f'<text x="{middle_x}" y="{HEIGHT - 10}" text-anchor="middle">{names[0]}</text>',
-        f'<text transform="translate(14 {middle_y}) rotate(-90)" text-anchor="middle">{names[1]}</text>',
-    ]
-    return "".join(parts)

@@ -1,4 +1,4 @@
-"""How the report's page looks: light, calm, one column on a phone."""
+"""The report page's style sheet: light, calm, one column on a phone."""
 
 STYLE = """
 :root{color-scheme:light}

@@ -1,4 +1,4 @@
-"""A walk through a scene as one HTML page: opened by a double click, it asks nothing of the network.
+"""The viewer page, one HTML file to move through a scene in: opened by a double click, it asks nothing of the network.
 
 Pure: scenes and panorama come in encoded, the page goes out as text. A policy in the page forbids every request. The
 page's parts are this package's viewer_page/; its libraries (three and Spark, MIT) were bundled by
@@ -14,49 +14,49 @@ from importlib.resources import files
 
 import numpy as np
 
-from rein3d_jax.report.plan import Plan
-from rein3d_jax.report.report import SIGNATURES
+from rein3d_jax.report.floor_map import FloorMap
+from rein3d_jax.report.report import Picture, picture_uri
 
 # Workers and WebAssembly of the bundle come from the page itself, as blobs and data.
-POLICY = (
+_POLICY = (
     "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; worker-src data: blob:; "
     "connect-src data: blob:; script-src 'unsafe-inline' 'wasm-unsafe-eval' data: blob:"
 )
-SERVED_POLICY = POLICY.replace("connect-src", "connect-src 'self'")
-FILTER_VARIANCE = 0.3  # pixels^2, RasterizeConfig's; pass the scene's own where it was made with another
+_SERVED_POLICY = _POLICY.replace("connect-src", "connect-src 'self'")
+_FILTER_VARIANCE = 0.3  # pixels^2, RasterizeConfig's; pass the scene's own where it was made with another
 
 
 def render_viewer(
     scenes: Mapping[str, bytes | str],
     panorama: bytes | None,
-    plan: Plan,
+    floor_map: FloorMap,
     *,
     title: str = "Your room in 3D",
     backdrop: Sequence[float] = (0.5, 0.5, 0.5),
-    filter_variance: float = FILTER_VARIANCE,
+    filter_variance: float = _FILTER_VARIANCE,
 ) -> str:
-    """The whole page. `scenes`: name -> the bytes of an SPZ file (io/spz.py), the last one shown first; or all of them
-    paths on the server that the page comes from, fetched when they are looked at. `panorama`: a JPEG or PNG file.
-    `plan`: the walls and paths of the map, and the area that one may walk in. `backdrop`: the sRGB colour of what no
-    splat covers. Raises ValueError for a scene or picture of another format."""
+    """HTML of the whole page. `scenes`: name -> the bytes of an SPZ file, the last one shown first; or all of them
+    paths on the server that the page comes from, fetched when they are shown. `panorama`: a JPEG or PNG file.
+    `floor_map`: walls, paths, and the safe area, which the visitor does not leave. `backdrop`: the sRGB colour of what
+    no splat covers. Raises ValueError for a scene or picture of another format."""
     served = all(isinstance(data, str) for data in scenes.values())
     if not scenes or not (served or all(_is_spz(data) for data in scenes.values())):
         raise ValueError("a viewer's scenes are one SPZ file or more, or all of them paths on its server")
     payload = {
         "scenes": [
-            {"name": name, "url": data} if served else {"name": name, "spz": _base64(data)}
+            {"name": name} | ({"url": data} if served else {"spz": base64.b64encode(data).decode()})
             for name, data in scenes.items()
         ],
-        "panorama": _picture(panorama) if panorama is not None else None,
-        "walls": _points(plan.walls),
-        "safe": _points(plan.safe),
-        "paths": [_points(path) for path in plan.paths],
+        "panorama": picture_uri(Picture("panorama", panorama)) if panorama is not None else None,
+        "walls": _points(floor_map.walls),
+        "safe": _points(floor_map.safe),
+        "paths": [_points(path) for path in floor_map.paths],
         "backdrop": [float(value) for value in backdrop],
         "filterVariance": filter_variance,
     }
     parts = {
         "title": escape(title),
-        "policy": SERVED_POLICY if served else POLICY,
+        "policy": _SERVED_POLICY if served else _POLICY,
         "style": _file("page.css"),
         "licences": escape(_file("LICENCES.txt")),
         "data": json.dumps(payload, allow_nan=False).replace("<", "\\u003c"),  # no name can end the script
@@ -72,17 +72,6 @@ def _file(name: str) -> str:
 
 def _is_spz(data: bytes | str) -> bool:
     return isinstance(data, bytes) and data.startswith(b"\x1f\x8b")
-
-
-def _base64(data: bytes) -> str:
-    return base64.b64encode(data).decode()
-
-
-def _picture(data: bytes) -> str:
-    media = next((media for signature, media in SIGNATURES.items() if data.startswith(signature)), None)
-    if media is None:
-        raise ValueError("a viewer's panorama is a JPEG or PNG file")
-    return f"data:{media};base64,{_base64(data)}"
 
 
 def _points(points: np.ndarray) -> list[list[float]]:

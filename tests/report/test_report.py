@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rein3d_jax.report.chart import MAX_POINTS, Chart, Series, line_chart, nice_ticks
-from rein3d_jax.report.colour_map import UNKNOWN, VIRIDIS, colour_map, colour_range
-from rein3d_jax.report.plan import Plan, floor_plan, outline
+from rein3d_jax.report.colour_map import VIRIDIS, colour_map, colour_range
+from rein3d_jax.report.floor_map import FloorMap, outline, render_floor_map
 from rein3d_jax.report.report import Comparison, Picture, Report, Section, Table, render_report
 from rein3d_jax.report.scatter import Mark, Scatter, cost_ticks, scatter_chart
 
@@ -40,7 +40,7 @@ WHOLE = Report(
         "dB",
         (Mark(f"mark {HOSTILE}", 3.0, 20.0), Mark("this run", 90.0, 22.0, own=True)),
     ),
-    plan=Plan(outline(np.ones(16)), outline(np.full(16, 0.6)), (np.array([[0, 0], [0.5, 0]]),), np.zeros((0, 2))),
+    floor_map=FloorMap(outline(np.ones(16)), outline(np.full(16, 0.6)), (np.array([[0, 0], [0.5, 0]]),), []),
     charts=(
         Chart(f"chart {HOSTILE}", f"x {HOSTILE}", "y", (Series(f"series {HOSTILE}", np.arange(3), np.arange(3)),)),
     ),
@@ -50,7 +50,7 @@ WHOLE = Report(
 
 
 class Page(HTMLParser):
-    """Collects the tags with their attributes, the text, and whether every tag is closed in its turn."""
+    """Collects the tags with their attributes, the text, and whether every tag is closed in order."""
 
     def __init__(self, html):
         super().__init__()
@@ -82,22 +82,8 @@ def test_the_page_is_well_formed_and_shows_every_text_as_text(page):
     assert page.open == []
     assert not any(tag == "script" for tag, _ in page.tags)
     text = "".join(page.words)
-    above = ("title", "summary", "fact", "value", "origin", "warning", "section", "caption", "picture")
-    for name in (
-        *above,
-        "beside",
-        "standing",
-        "stands",
-        "cost",
-        "mark",
-        "chart",
-        "x",
-        "series",
-        "table",
-        "column",
-        "cell",
-        "source",
-    ):
+    names = "title summary fact value origin warning section caption picture beside standing stands cost mark chart x"
+    for name in (*names.split(), "series", "table", "column", "cell", "source"):
         assert f"{name} {HOSTILE}" in text
 
 
@@ -143,9 +129,10 @@ def circles(svg):
     return [(float(c.get("cx")), float(c.get("cy"))) for c in tree.iter("circle")]
 
 
-def test_the_plan_looks_up_its_forward_axis_with_left_on_the_left():
+def test_the_floor_map_has_the_forward_axis_upwards_and_left_on_the_left():
     forward, left = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0.0, 0.0], [0.0, 1.0]])
-    ahead, beside, origin = circles(floor_plan(Plan(outline(np.full(8, 2.0)), np.zeros((0, 2)), (forward, left), [])))
+    drawn = FloorMap(outline(np.full(8, 2.0)), np.zeros((0, 2)), (forward, left), [])
+    ahead, beside, origin = circles(render_floor_map(drawn))
     assert ahead[1] < origin[1] and ahead[0] == origin[0]
     assert beside[0] < origin[0] and beside[1] == origin[1]
     np.testing.assert_allclose(origin[1] - ahead[1], origin[0] - beside[0], atol=0.2)  # written to a tenth of a unit
@@ -153,9 +140,9 @@ def test_the_plan_looks_up_its_forward_axis_with_left_on_the_left():
 
 def test_a_far_view_through_a_door_does_not_shrink_the_room():
     profile = np.full(64, 2.0)
-    alone = floor_plan(Plan(outline(profile), outline(profile), (), []))
+    alone = render_floor_map(FloorMap(outline(profile), outline(profile), (), []))
     profile[3] = 90.0
-    with_door = floor_plan(Plan(outline(profile), outline(np.full(64, 2.0)), (), []))
+    with_door = render_floor_map(FloorMap(outline(profile), outline(np.full(64, 2.0)), (), []))
     np.testing.assert_allclose(circles(with_door), circles(alone), atol=20)  # one column of 64 less to hold
 
 
@@ -213,6 +200,9 @@ def test_a_long_curve_is_thinned_and_keeps_its_mean():
     svg = line_chart(Chart("loss", "step", "loss", (series,)))
     points = re.search(r'polyline points="([^"]*)"', svg).group(1).split()
     assert len(points) == MAX_POINTS
+    heights = [float(point.split(",")[1]) for point in points]
+    ends = [float(y) for y in re.findall(r'class="grid" d="M62 ([\d.]+)H', svg)]  # the ticks at 0 and 1
+    np.testing.assert_allclose(np.mean(heights), (ends[0] + ends[-1]) / 2, atol=0.05)  # written to a tenth of a unit
 
 
 def test_colours_run_from_near_to_far_and_unknown_is_grey():
@@ -220,7 +210,7 @@ def test_colours_run_from_near_to_far_and_unknown_is_grey():
     rgb = colour_map(distance, valid, 1.0, 3.0)
     assert rgb.dtype == np.float32
     np.testing.assert_allclose(rgb[:3] * 255, VIRIDIS[[0, -1, -1]], atol=1e-4)  # float32
-    np.testing.assert_array_equal(rgb[3:], np.full((2, 3), UNKNOWN))
+    np.testing.assert_array_equal(rgb[3:], np.full((2, 3), np.float32(0.75)))
 
 
 def test_farther_is_always_lighter():

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from rein3d_jax.io.pictures.image import encode_jpeg, encode_png
-from rein3d_jax.report.plan import Plan
+from rein3d_jax.report.floor_map import FloorMap
 from rein3d_jax.report.viewer import render_viewer
 
 SPZ = b"\x1f\x8b of a scene"  # the page checks no more than that it is gzip
 SQUARE = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 3
-PLAN = Plan(3 * SQUARE, SQUARE, (SQUARE[:2],), np.zeros((0, 2)))
+PLAN = FloorMap(3 * SQUARE, SQUARE, (SQUARE[:2],), np.zeros((0, 2)))
 HOSTILE = "</script><script>alert(1)</script><!-- {{walk}}"
 
 
@@ -71,5 +71,5 @@ def test_what_is_no_scene_or_picture_is_refused():
         render_viewer({}, None, PLAN)
     with pytest.raises(ValueError, match="one SPZ file or more"):
         render_viewer({"a": b"ply"}, None, PLAN)
-    with pytest.raises(ValueError, match="JPEG or PNG"):
+    with pytest.raises(ValueError, match="neither JPEG nor PNG"):
         render_viewer({"a": SPZ}, b"GIF89a", PLAN)

@@ -13,7 +13,7 @@ from rein3d_jax.geometry.poses import pinhole_camera, upright
 from rein3d_jax.io.pictures.image import encode_png
 from rein3d_jax.io.splats.spz import encode_spz
 from rein3d_jax.rasterize import RasterizeConfig, render
-from rein3d_jax.report.plan import Plan
+from rein3d_jax.report.floor_map import FloorMap
 from rein3d_jax.report.viewer import render_viewer
 from rein3d_jax.scene import Gaussians
 
@@ -47,7 +47,7 @@ def room(box_room):
 def page(room, tmp_path_factory):
     """The page, open; what it complained of and asked for."""
     scene, panorama = room
-    plan = Plan(4 * SAFE, SAFE, (SAFE[:2],), np.zeros((0, 2)))
+    plan = FloorMap(4 * SAFE, SAFE, (SAFE[:2],), np.zeros((0, 2)))
     html = render_viewer({HOSTILE: encode_spz(scene)}, encode_png(panorama), plan, title=HOSTILE)
     path = tmp_path_factory.mktemp("viewer") / "viewer.html"
     path.write_text(html, encoding="utf-8")

@@ -7,13 +7,13 @@ import numpy as np
 from rein3d_jax.geometry.sphere import azimuths, horizontal_direction
 from rein3d_jax.report.chart import legend
 
-SIZE = 480  # SVG units of the longer side
-MARGIN = 0.4  # metres round what is drawn
-WALLS, SAFE, PATH, VIEW, ORIGIN = "#5b6670", "#bfe3d0", "#1f7a8c", "#c8553d", "#23303a"
+_SIZE = 480  # SVG units of the longer side
+_MARGIN = 0.4  # metres round what is drawn
+_WALLS, _SAFE, _PATH, _VIEW, _ORIGIN = "#5b6670", "#bfe3d0", "#1f7a8c", "#c8553d", "#23303a"
 
 
 @dataclass(frozen=True)
-class Plan:
+class FloorMap:
     """World positions on the floor plane, (x, y) metres."""
 
     walls: np.ndarray  # (m, 2) outline of the nearest surfaces at eye height
@@ -23,27 +23,28 @@ class Plan:
 
 
 def outline(profile: np.ndarray) -> np.ndarray:
-    """A distance for each column (w,), metres, at the horizon -> its closed outline (w, 2)."""
+    """(w, 2) metres: the closed outline of a distance for each column (w,), metres, at the horizon."""
     directions = np.asarray(horizontal_direction(azimuths(len(profile))))[:, :2]
     return np.asarray(profile)[:, None] * directions
 
 
-def floor_plan(plan: Plan) -> str:
-    """The plan as SVG and a legend. The panorama's centre column looks up the page; the grid is 1 m."""
-    low, high = _bounds(plan)
-    scale = SIZE / (high - low).max()
+def render_floor_map(floor_map: FloorMap) -> str:
+    """SVG of the map and a legend. The panorama's centre column points up the page; the grid is 1 m."""
+    low, high = _bounds(floor_map)
+    scale = _SIZE / (high - low).max()
     width, height = (high - low) * scale
     shapes = [
-        _line(plan.walls, f'fill="#fff" stroke="{WALLS}" stroke-width="2.5"', low, scale, closed=True),
-        _line(plan.safe, f'fill="{SAFE}" stroke="none"', low, scale, closed=True),
+        _line(floor_map.walls, f'fill="#fff" stroke="{_WALLS}" stroke-width="2.5"', low, scale, closed=True),
+        _line(floor_map.safe, f'fill="{_SAFE}" stroke="none"', low, scale, closed=True),
         _grid(low, high, scale),
-        *(_line(path, f'fill="none" stroke="{PATH}" stroke-width="2"', low, scale) for path in plan.paths),
-        *(_dot(path[-1], PATH, 3, low, scale) for path in plan.paths if len(path)),
-        *(_dot(view, VIEW, 6, low, scale) for view in plan.views),
-        _dot(np.zeros(2), ORIGIN, 6, low, scale),
+        *(_line(path, f'fill="none" stroke="{_PATH}" stroke-width="2"', low, scale) for path in floor_map.paths),
+        *(_dot(path[-1], _PATH, 3, low, scale) for path in floor_map.paths if len(path)),
+        *(_dot(view, _VIEW, 6, low, scale) for view in floor_map.views),
+        _dot(np.zeros(2), _ORIGIN, 6, low, scale),
     ]
-    entries = [("nearest surface", WALLS), ("safe for a camera", SAFE), ("camera paths", PATH)]
-    entries += [("ground-truth views", VIEW)] * bool(len(plan.views)) + [("panorama, looking up the page", ORIGIN)]
+    entries = [("nearest surface", _WALLS), ("safe for a camera", _SAFE), ("camera paths", _PATH)]
+    entries += [("ground-truth views", _VIEW)] * bool(len(floor_map.views))
+    entries += [("panorama, looking up the page", _ORIGIN)]
     return (
         f'<svg class="plan" viewBox="0 0 {width:.1f} {height:.1f}" role="img" aria-label="The room from above">'
         f"{''.join(shapes)}</svg>{legend(entries)}"
@@ -55,13 +56,13 @@ def _page(points: np.ndarray) -> np.ndarray:
     return -np.asarray(points, float).reshape(-1, 2)[:, ::-1]
 
 
-def _bounds(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
+def _bounds(floor_map: FloorMap) -> tuple[np.ndarray, np.ndarray]:
     """Page corners (2,), (2,) in metres. A surface seen far through a door or window may leave the page."""
-    walls = _page(plan.walls)
+    walls = _page(floor_map.walls)
     radii = np.linalg.norm(walls, axis=1)
     walls = walls[radii <= 5 * np.median(radii)] if len(walls) else walls
-    drawn = np.concatenate([walls, np.zeros((1, 2)), *map(_page, (plan.safe, *plan.paths, plan.views))])
-    return drawn.min(axis=0) - MARGIN, drawn.max(axis=0) + MARGIN
+    drawn = np.concatenate([walls, np.zeros((1, 2)), *map(_page, (floor_map.safe, *floor_map.paths, floor_map.views))])
+    return drawn.min(axis=0) - _MARGIN, drawn.max(axis=0) + _MARGIN
 
 
 def _line(points: np.ndarray, style: str, low: np.ndarray, scale: float, *, closed: bool = False) -> str:
