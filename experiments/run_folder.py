@@ -11,16 +11,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from experiments.config import load_config, recipe_digest
-from experiments.reconstruct.__main__ import BLANK_SCENE, BLANK_TRAJECTORIES, ReconstructConfig, _blank, _blank_restored
-from experiments.reconstruct.stage_store import PART
+from experiments.reconstruct.config import ReconstructConfig
+from experiments.reconstruct.stage_store import UNFINISHED, blank_stages, read_stage
 from rein3d_jax.errors import InputError
 from rein3d_jax.explore.trajectories import Trajectories
-from rein3d_jax.io.files.checkpoint import load
 from rein3d_jax.io.files.json_file import read_json
 from rein3d_jax.io.files.npy import read_arrays, read_headers
 from rein3d_jax.io.splats.ply import read_ply
-from rein3d_jax.refine import blank_snapshot
-from rein3d_jax.refine.parameters import join_parameters
 from rein3d_jax.scene import Gaussians, Panorama, Video
 
 
@@ -35,13 +32,13 @@ class RunFolder:
     @cached_property
     def panorama(self) -> Panorama:
         """The input at the working height, its distance complete."""
-        found = self._stage("read", (_blank(Panorama, valid=bool), np.zeros(0, bool)))[0]
+        found = self._stage("read")[0]
         return self._sound("read", found, _is_panorama(found.rgb.shape, found.distance.shape, found.valid.shape))
 
     @cached_property
     def trajectories(self) -> Trajectories:
         """Where the camera went."""
-        found = self._stage("explore", BLANK_TRAJECTORIES())
+        found = self._stage("explore")
         paths, frames = found.positions.shape[:2] if found.positions.ndim == 3 else (0, 0)
         shaped = found.counts.shape == (paths,) and found.world_from_camera.shape == (paths, frames, 4, 4)
         within = bool(jnp.all((found.counts >= 1) & (found.counts <= frames)))
@@ -50,7 +47,7 @@ class RunFolder:
     @cached_property
     def coarse(self) -> Gaussians:
         """The lifted panorama."""
-        return self._stage("lift", BLANK_SCENE())
+        return self._stage("lift")
 
     @cached_property
     def refined(self) -> Gaussians:
@@ -64,9 +61,8 @@ class RunFolder:
 
     @property
     def unfinished(self) -> Gaussians:
-        """The scene as refinement last looked at it."""
-        state = self._stage(PART.removesuffix(".npz"), blank_snapshot(self.config.refine)).state
-        return join_parameters(state.parameters, state.alive)
+        """The scene at refinement's last held-out evaluation."""
+        return self._stage(UNFINISHED).scene
 
     @property
     def finished(self) -> bool:
@@ -91,8 +87,8 @@ class RunFolder:
     def curves(self, names: Iterable[str]) -> dict[str, np.ndarray]:
         """The curves (k, 2) of (step, value) that refinement has drawn so far."""
         names = list(names)
-        keys = [f"['result'].curves['{name}']" for name in names]
-        path = self.path / "stages" / PART
+        keys = [f"['result'].curves.{name}" for name in names]
+        path = self.path / "stages" / f"{UNFINISHED}.npz"
         headers = read_headers(path)
         if not all(key in headers and headers[key].shape[1:] == (2,) for key in keys):
             raise InputError(f"{path} has no curves: it is damaged, or of another version")
@@ -102,14 +98,13 @@ class RunFolder:
         """The restored panoramas along each trajectory, one after another."""
         for index in range(self.config.explore.trajectories):
             name = f"restore-{index:02d}"
-            found = self._stage(name, _blank_restored()).video
+            found = self._stage(name).video
             posed = found.world_from_camera.shape == (len(found.rgb), 4, 4)
             shapes = (found.rgb.shape[1:], found.distance.shape[1:], found.alpha.shape[1:])
             yield self._sound(name, found, posed and _is_panorama(*shapes))
 
-    def _stage(self, name: str, like: Any) -> Any:
-        shape = {"key": np.zeros(0, np.uint8), "result": like, "seconds": np.float64(0)}
-        return load(self.path / "stages" / f"{name}.npz", shape)["result"]
+    def _stage(self, name: str) -> Any:
+        return read_stage(self.path / "stages" / f"{name}.npz", blank_stages(self.config.refine)[name.split("-")[0]])
 
     def _sound(self, name: str, found: Any, shaped: bool) -> Any:
         finite = all(bool(jnp.all(jnp.isfinite(leaf))) for leaf in jax.tree.leaves(found))

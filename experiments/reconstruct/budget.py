@@ -5,21 +5,23 @@ import time
 from dataclasses import dataclass
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.pipeline.pipeline import Stages
+from rein3d_jax.pipeline.stages import Stages
+from rein3d_jax.settings import Settings, setting
 
-EXPLORED, REFINED = 0.6, 0.9  # shares of the seconds after which no path is begun, and refinement ends
+OUT_OF_TIME = "the budget's seconds were spent"
+_EXPLORED, _REFINED = 0.6, 0.9  # shares of the seconds after which no path is begun, and refinement ends
 
 
 @dataclass(frozen=True)
-class BudgetConfig:
-    gaussians: int = 0  # 0, here and below: no limit
-    bytes: int = 0  # of scene.ply
-    seconds: float = 0.0  # of the job but for its writing; what was begun is finished
-    tolerance: float = 0.0  # dB that refinement may leave unreached: it stops at looks that bring less
+class BudgetConfig(Settings):
+    """Limits of the whole job; 0 sets none."""
 
-    def __post_init__(self):
-        if min(self.gaussians, self.bytes, self.seconds, self.tolerance) < 0:
-            raise InputError("budget.gaussians, bytes, seconds and tolerance must not be below 0")
+    gaussians: int = setting(0, "Gaussians of the scene", within="[0, inf)")
+    bytes: int = setting(0, "of scene.ply", within="[0, inf)", unit="bytes")
+    seconds: float = setting(0.0, "of the job but for its writing; what was begun is finished", within="[0, inf)")
+    tolerance: float = setting(
+        0.0, "that refinement may leave unreached: it stops where evaluations bring less", within="[0, inf)", unit="dB"
+    )
 
 
 def bytes_of_one(sh_degree: int) -> int:
@@ -30,12 +32,12 @@ def bytes_of_one(sh_degree: int) -> int:
 def within(stages: Stages, budget: BudgetConfig) -> Stages:
     """The stages with the limits of `budget` laid over their own; the clock apart."""
     refine = stages.refine
-    limits = [refine.most, budget.gaussians, budget.bytes // bytes_of_one(refine.sh_degree)]
+    limits = [refine.max_count, budget.gaussians, budget.bytes // bytes_of_one(refine.sh_degree)]
     if 0 < budget.bytes < bytes_of_one(refine.sh_degree):
         raise InputError(f"budget.bytes {budget.bytes} holds no Gaussian; one takes {bytes_of_one(refine.sh_degree)}")
-    most = min((limit for limit in limits if limit > 0), default=0)
+    max_count = min((limit for limit in limits if limit > 0), default=0)
     plateau = max(refine.plateau, budget.tolerance)
-    return dataclasses.replace(stages, refine=dataclasses.replace(refine, most=most, plateau=plateau))
+    return dataclasses.replace(stages, refine=dataclasses.replace(refine, max_count=max_count, plateau=plateau))
 
 
 class Clock:
@@ -50,8 +52,8 @@ class Clock:
 
     def explored(self) -> bool:
         """Whether no further path should be begun."""
-        return self.seconds > 0 and self.elapsed() > EXPLORED * self.seconds
+        return self.seconds > 0 and self.elapsed() > _EXPLORED * self.seconds
 
     def refined(self) -> bool:
         """Whether refinement should end."""
-        return self.seconds > 0 and self.elapsed() > REFINED * self.seconds
+        return self.seconds > 0 and self.elapsed() > _REFINED * self.seconds

@@ -7,28 +7,24 @@ import jax.numpy as jnp
 import numpy as np
 
 from rein3d_jax.conventions import PINHOLE
-from rein3d_jax.errors import InputError
 from rein3d_jax.explore.trajectories import Trajectories
 from rein3d_jax.geometry.pinhole import focal_from_fov
 from rein3d_jax.geometry.poses import upright
 from rein3d_jax.rasterize import RasterizeConfig, allocate, render
 from rein3d_jax.scene import Camera, Gaussians
+from rein3d_jax.settings import Settings, setting
 
 
 @dataclasses.dataclass(frozen=True)
-class FilmConfig:
+class FilmConfig(Settings):
     """The film's size and pace."""
 
-    width: int = 480  # pixels
-    height: int = 270
-    fov: float = 1.5  # radians across the width
-    step: float = 0.2  # metres between frames: 3 m/s at 15 frames a second
-    turn: float = 0.1  # radians between frames
-    rate: int = 15  # frames a second
-
-    def __post_init__(self):
-        if min(self.width, self.height) < 16 or self.rate < 1 or self.step <= 0 or self.turn <= 0:
-            raise InputError("film: width and height must be at least 16, rate at least 1, step and turn above 0")
+    width: int = setting(480, "of a frame", within="[16, 8192]", unit="pixels")
+    height: int = setting(270, "of a frame", within="[16, 8192]", unit="pixels")
+    fov: float = setting(1.5, "across the width", within="(0, 3]", unit="radians")
+    step: float = setting(0.2, "between frames on a path", within="(0, inf)", unit="metres")
+    turn: float = setting(0.1, "between frames on the way round to the next path", within="(0, inf)", unit="radians")
+    rate: int = setting(15, "of the film", within="[1, 240]", unit="frames a second")
 
 
 def _camera(position, yaw, film: FilmConfig) -> Camera:

@@ -6,7 +6,9 @@ from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.progress import Progress as Bars
 
-STAGE_COST = {"read": 8, "lift": 5, "explore": 2, "restore": 16}  # in refinement steps, on a laptop's CPU
+from experiments.reconstruct.stage_store import Finished
+
+_STAGE_COST = {"read": 8, "lift": 5, "explore": 2, "restore": 16}  # in refinement steps, on a laptop's CPU
 
 
 class Progress:
@@ -17,8 +19,8 @@ class Progress:
         columns = (TextColumn("{task.description:<12}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
         self.bars = Bars(*columns, console=self.console, transient=True)
         paths = config.explore.trajectories
-        total = sum(STAGE_COST.values()) + (paths - 1) * STAGE_COST["restore"] + config.refine.steps
-        self.task = self.bars.add_task("reading", total=total)
+        total = sum(_STAGE_COST.values()) + (paths - 1) * _STAGE_COST["restore"] + config.refine.steps
+        self.task, self.before_steps = self.bars.add_task("reading", total=total), 0
 
     def __enter__(self):
         self.bars.start()
@@ -27,16 +29,15 @@ class Progress:
     def __exit__(self, *_):
         self.bars.stop()
 
-    def done(self, name: str, seconds: float, reused: bool) -> None:
+    def done(self, stage: Finished) -> None:
         """A stage is finished, or was found finished."""
-        note = "found finished" if reused else f"{seconds:.1f} s"
-        self.console.print(f"{name:<12} {note}")
-        cost = STAGE_COST.get(name.split("-")[0], 0)
-        self.bars.update(self.task, advance=cost, description=f"after {name}")
+        self.console.print(f"{stage.name:<12} {'found finished' if stage.found else f'{stage.seconds:.1f} s'}")
+        self.before_steps += _STAGE_COST.get(stage.name.split("-")[0], 0)
+        self.bars.update(self.task, completed=self.before_steps, description=f"after {stage.name}")
 
     def step(self, number: int) -> None:
-        """One refinement step is done."""
-        self.bars.update(self.task, advance=1, description="refine")
+        """`number` refinement steps are done."""
+        self.bars.update(self.task, completed=self.before_steps + number, description="refine")
 
     def finish(self, output: Path, metrics: dict) -> None:
         """The last lines: what came out, and what to open."""

@@ -1,39 +1,43 @@
 """metrics.json: what a run cost, how large its scene is, why each stage stopped, how good it is."""
 
 import resource
-from collections.abc import Sequence
 from pathlib import Path
 
 from experiments.reconstruct.stage_store import StageStore
-from rein3d_jax.refine import STOPPED
-from rein3d_jax.scene import Gaussians, Panorama
+from rein3d_jax.explore.profile import ExploreConfig
+from rein3d_jax.pipeline.reconstruct import Reconstruction
 
 
 def cost(store: StageStore) -> dict:
     """Seconds by stage, and the most memory that the process held."""
-    seconds = {**{name: round(value, 3) for name, value in store.seconds.items()}, "write": 0.0, "total": 0.0}
+    seconds = {**{name: round(value, 3) for name, value in store.seconds().items()}, "write": 0.0, "total": 0.0}
     return {"seconds": seconds, "peak_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024}
 
 
-def size(panorama: Panorama, coarse: Gaussians, refined: Gaussians, ply: Path) -> dict:
+def size(result: Reconstruction, ply: Path) -> dict:
     """Gaussians before and after, beside the panorama's pixels; bytes of the scene."""
-    living = {"lift": int(coarse.alive.sum()), "refined": int(refined.alive.sum())}
-    return {"count": {"pixels": int(panorama.distance.size), **living}, "bytes": {ply.name: ply.stat().st_size}}
+    living = {"lift": int(result.coarse.alive.sum()), "refined": int(result.scene.alive.sum())}
+    return {"count": {"pixels": int(result.panorama.distance.size), **living}, "bytes": {ply.name: ply.stat().st_size}}
 
 
-def choices(store: StageStore, revealed: Sequence[float], paths: int, least: float, curves: dict) -> dict:
-    """What each path revealed and cost, why exploring and refining ended, and what refining brought at each look."""
-    taken = [
-        {"revealed": share, "restored": share >= least, "seconds": round(store.each[f"restore-{index:02d}"], 3)}
-        for index, share in enumerate(revealed)
+def choices(result: Reconstruction, store: StageStore, explore: ExploreConfig) -> dict:
+    """What each path revealed and cost, why exploring and refining ended, and what each held-out evaluation found."""
+    seconds = {stage.name: round(stage.seconds, 3) for stage in store.finished}
+    paths = [
+        {"revealed": share, "restored": share >= explore.least, "seconds": seconds[f"restore-{index:02d}"]}
+        for index, share in enumerate(result.decisions.revealed)
     ]
-    explored = "all paths taken" if len(revealed) == paths else "the budget's seconds were spent"
-    looks = [{"step": int(step), "held_out_psnr": round(float(psnr), 3)} for step, psnr in curves["psnr"]]
-    return {"paths": taken, "looks": looks,
-            "stopped": {"explore": explored, "refine": STOPPED[int(curves["stopped"])]}}  # fmt: skip
+    found = [{"step": int(step), "held_out_psnr": round(float(psnr), 3)} for step, psnr in result.curves.psnr]
+    stopped = {"explore": result.decisions.explored, "refine": result.decisions.refined}
+    return {"paths": paths, "evaluations": found, "stopped": stopped}
 
 
-def trouble(overflow: dict[str, int], curves: dict) -> dict:
+def trouble(result: Reconstruction) -> dict:
     """What found no room, by the key that makes room, and steps that were skipped or buffers that had to grow."""
-    counts = {"reallocated": int(curves["reallocated"]), "skipped_steps": int(curves["skipped"])}
+    overflow = {
+        "explore.max_frames": int(result.trajectories.overflow.sum()),
+        "lift.capacity": int(result.decisions.overflow),
+        "refine.spare": int(result.curves.overflow),
+    }
+    counts = {"reallocated": int(result.curves.reallocated), "skipped_steps": int(result.curves.skipped)}
     return {"overflow": sum(overflow.values()), "overflows": overflow, **counts}

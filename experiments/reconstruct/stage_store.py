@@ -1,5 +1,6 @@
 """Finished stages on disk: saved whole or not at all, and used again only for the very same job."""
 
+import dataclasses
 import hashlib
 import json
 import time
@@ -7,66 +8,111 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from rein3d_jax.errors import InputError
+from rein3d_jax.explore.trajectories import Trajectories
 from rein3d_jax.io.files.checkpoint import load, save
+from rein3d_jax.pipeline.explore_and_restore import Explored
+from rein3d_jax.refine import RefineConfig, Snapshot, blank_snapshot
+from rein3d_jax.scene import Gaussians, Panorama, Video
 
-PART = "unfinished.npz"
+UNFINISHED = "unfinished"  # what the stage being made has so far
+
+
+def blank_stages(refine: RefineConfig) -> dict[str, Any]:
+    """Each stage's result, as a pytree of its structure and dtypes with which to read one back, by its file's name."""
+    scene, snapshot = _blank(Gaussians, alive=bool), blank_snapshot(refine)
+    video, number = _blank(Video), jnp.zeros(0, jnp.int32)
+    return {
+        "read": (_blank(Panorama, valid=bool), np.zeros(0, bool)),  # and whether the distance was fitted
+        "lift": scene,
+        "explore": _blank(Trajectories, counts=jnp.int32, overflow=jnp.int32),
+        "restore": Explored(scene, video, number, jnp.zeros(0), number, number),
+        "refine": (scene, snapshot.curves, ""),  # and why it ended
+        UNFINISHED: snapshot,
+    }
+
+
+def _blank(struct_type, **dtypes):
+    names = [field.name for field in dataclasses.fields(struct_type)]
+    return struct_type(**{name: jnp.zeros(0, dtypes.get(name, jnp.float32)) for name in names})
+
+
+@dataclasses.dataclass(frozen=True)
+class Finished:
+    """A stage that has its result."""
+
+    name: str
+    seconds: float  # that it took when it was made
+    found: bool  # made by an earlier job
 
 
 class StageStore:
     """A folder of stage results. A stage's key hashes all that its result depends on: the key of the stage before and
-    its own config. With `resume`, a result under the same key is read instead of made."""
+    its own settings. With `resume`, a result under the same key is read instead of made."""
 
-    def __init__(self, folder: Path, *, resume: bool, on_done: Callable[[str, float, bool], None]):
-        self.folder, self.resume, self.on_done = folder, resume, on_done
-        self.seconds: dict[str, float] = {}  # by the name's part before "-"
-        self.each: dict[str, float] = {}
+    def __init__(self, folder: Path, refine: RefineConfig, *, resume: bool):
+        self.folder, self.resume, self.blanks = folder, resume, blank_stages(refine)
+        self.finished: list[Finished] = []
         self.key = ""
 
-    def run(self, name: str, depends: Any, like: Any, make: Callable[[], Any]) -> Any:
-        """The result of stage `name`, a pytree shaped as `like`: read if finished, else made and saved."""
+    def run(self, name: str, depends: Any, make: Callable[[], Any]) -> Any:
+        """The result of stage `name` ("restore-03" is one of the kind "restore"): read if finished, else made and
+        saved."""
         self.key = hashlib.sha256(json.dumps([self.key, name, depends], sort_keys=True).encode()).hexdigest()
-        path = self.folder / f"{name}.npz"
-        digest = self._digest()
-        found = self._finished(path, digest, like) if self.resume else None
-        if found is None:
+        path, like = self.folder / f"{name}.npz", self.blanks[name.split("-")[0]]
+        stored = self._stored(path, like) if self.resume else None
+        found = stored is not None
+        if not found:
             started = time.perf_counter()
             result = make()
-            save(path, {"key": digest, "result": result, "seconds": np.float64(time.perf_counter() - started)})
-            (self.folder / PART).unlink(missing_ok=True)
-        # A fresh run goes on with what a resumed one would read: the same bytes either way.
-        stored = found or load(path, self._shape(digest, like))
-        spent = float(stored["seconds"])
-        part = name.split("-")[0]
-        self.seconds[part] = self.seconds.get(part, 0.0) + spent
-        self.each[name] = spent
-        self.on_done(name, spent, found is not None)
+            self._save(path, result, time.perf_counter() - started)
+            (self.folder / f"{UNFINISHED}.npz").unlink(missing_ok=True)
+            # A fresh run goes on with what a resumed one would read: the same bytes either way.
+            stored = load(path, _shape(like))
+        self.finished.append(Finished(name, float(stored["seconds"]), found))
         return stored["result"]
 
-    def keep(self, part: Any) -> None:
-        """Save what the stage being made has so far, for `kept`."""
-        save(self.folder / PART, {"key": self._digest(), "result": part, "seconds": np.float64(0)})
+    def save_unfinished(self, snapshot: Snapshot) -> None:
+        """What the stage being made has so far, for `unfinished`."""
+        self._save(self.folder / f"{UNFINISHED}.npz", snapshot, 0.0)
 
-    def kept(self, like: Any) -> Any | None:
-        """What `keep` saved of the very stage being made, shaped as `like`, or None."""
-        stored = self._finished(self.folder / PART, self._digest(), like) if self.resume else None
+    def unfinished(self) -> Snapshot | None:
+        """What `save_unfinished` had of the very stage being made, or None."""
+        stored = self._stored(self.folder / f"{UNFINISHED}.npz", self.blanks[UNFINISHED]) if self.resume else None
         return None if stored is None else stored["result"]
+
+    def seconds(self) -> dict[str, float]:
+        """By kind of stage."""
+        total: dict[str, float] = {}
+        for stage in self.finished:
+            kind = stage.name.split("-")[0]
+            total[kind] = total.get(kind, 0.0) + stage.seconds
+        return total
+
+    def _save(self, path: Path, result: Any, seconds: float) -> None:
+        save(path, {"key": self._digest(), "result": result, "seconds": np.float64(seconds)})
 
     def _digest(self) -> np.ndarray:
         return np.frombuffer(bytes.fromhex(self.key), np.uint8)
 
-    def _finished(self, path: Path, digest: np.ndarray, like: Any) -> dict | None:
+    def _stored(self, path: Path, like: Any) -> dict | None:
         """What is stored, if it is this very stage's; anything else is made again."""
         if not path.exists():
             return None
         try:
-            stored = load(path, self._shape(digest, like))
+            stored = load(path, _shape(like))
         except InputError:
             return None  # damaged, or shaped by another version
-        return stored if np.array_equal(stored["key"], digest) else None
+        return stored if np.array_equal(stored["key"], self._digest()) else None
 
-    @staticmethod
-    def _shape(digest: np.ndarray, like: Any) -> dict:
-        return {"key": digest, "result": like, "seconds": np.float64(0)}
+
+def _shape(like: Any) -> dict:
+    return {"key": np.zeros(0, np.uint8), "result": like, "seconds": np.float64(0)}
+
+
+def read_stage(path: Path, like: Any) -> Any:
+    """The result in a stage's file, whichever job's it is. Raises InputError where it is missing or damaged."""
+    return load(path, _shape(like))["result"]

@@ -1,77 +1,87 @@
-"""The refinement's numbers; the defaults are the paper's (Table 3dgs_refine_details) where it gives one."""
+"""Settings of the refinement; the defaults are the paper's (Table 3dgs_refine_details) where it gives one."""
 
 from dataclasses import dataclass
 
-from rein3d_jax.errors import InputError
+from rein3d_jax.settings import Settings, setting
 
-DENSIFICATIONS = ("default", "mcmc")
+_SHARE, _POSITIVE = "[0, 1]", "[0, inf)"
 
 
 @dataclass(frozen=True)
-class RefineConfig:
-    steps: int = 15_000
-    batch: int = 4  # views a step
-    devices: int = 1  # that share a step's views; 0 takes all
-    panoramic: bool = False  # fit to whole panoramas weighed by solid angle, not to perspective views of them
-    crop: int = 512  # pixels a side of a perspective view, or rows of a panorama
-    fov: float = 90.0  # degrees; six of 90 tile the sphere
-    test_every: int = 16  # every 16th view is held out
-    evaluate_every: int = 5_000  # steps between looks at the held-out views
-    sh_degree: int = 3
-    sh_degree_every: int = 1_000  # steps before the next degree joins in (3DGS)
-    # No Gaussian shrinks below this share of the size it was lifted with, a pixel's footprint: finer than the sampling
-    # of what was observed is noise that shows from elsewhere (Mip-Splatting's 3D filter, Sec. 5.1). 0 turns it off.
-    finest: float = 0.8
-    ssim_weight: float = 0.2
-    # Whether Gaussians on the surfaces that the input saw stay as they were lifted, and only guesses are refined:
-    # fitting sharpens them to the input's own sampling, which costs up to 0.3 dB elsewhere (benchmarks/NOTES.md).
-    keep_observed: bool = False
-    observed_weight: float = 1.0  # of a pixel that the input saw
-    restored_weight: float = 0.5  # of a pixel that was guessed
-    distance_weight: float = 0.0  # of |log distance| off the input's, where the input saw
-    opacity_weight: float = 0.0  # of the mean opacity; with "mcmc" its authors take 0.01
-    scale_weight: float = 0.0  # of the mean scale, in extents; likewise 0.01
-    # Rate of each trajectory's colour affine, so that guesses that disagree in tint do not blur each other; 0: none.
-    colour_rate: float = 0.0
-    means_rate: float = 1.6e-4  # times the scene's extent, decaying to means_rate_end of it
-    means_rate_end: float = 0.01
-    scales_rate: float = 5e-3
-    opacities_rate: float = 5e-2
-    quats_rate: float = 1e-3
-    sh_rate: float = 2.5e-3
-    sh_rest_rate: float = 1.25e-4
-    steps_at_once: int = 1  # steps in one compiled scan; more spares an accelerator the waits between them
-    plateau: float = 0.0  # dB; stop when `patience` looks in a row brought less. 0: never
-    patience: int = 2
-    densification: str = "default"  # clone and split by gradient (3DGS); or "mcmc", relocation under a hard cap
-    noise: float = 5e5  # of "mcmc": steers exploration (Kheradmand et al. 2024, their noise_lr)
-    spare: float = 1.0  # free slots for densification, as a share of the Gaussians it starts with
-    densify_start: int = 500
-    densify_stop: int = 13_000
-    densify_every: int = 100
-    densify_gradient: float = 2e-4  # mean 2D gradient, in half image widths, over which a Gaussian is cloned or split
-    # Whether that gradient is a sum of lengths over pixels, in which opposite pulls do not cancel: what is large and
-    # blurred then splits too (AbsGS, Ye et al. 2024, who take 8e-4 for densify_gradient with it).
-    absolute_gradient: bool = False
-    densify_share: float = 0.05  # of the buffer, at most, added at a time
-    split_size: float = 0.01  # share of the extent over which a Gaussian is split, not cloned
-    duplicates: int = 0  # times that pairs of near-duplicates are made one before it begins; see merge_duplicates.py
-    needless: float = 0.0  # mean change of the views for which Gaussians are left out before it begins; see prune.py
-    most: int = 0  # Gaussians, a budget: the ones that the views need least are left out, none grow beyond. 0: no limit
-    prune_opacity: float = 0.005
-    prune_size: float = 0.1  # share of the extent over which a Gaussian is pruned, after the first opacity reset
-    reset_every: int = 3_000
+class ViewsConfig(Settings):
+    """The perspective views that a scene is fitted to, cut out of panoramas."""
 
-    def __post_init__(self):
-        for name in ("steps", "evaluate_every", "sh_degree_every", "densify_every", "reset_every",
-                     "steps_at_once", "patience"):  # fmt: skip
-            if getattr(self, name) < (0 if name == "steps" else 1):
-                raise InputError(f"refine.{name} {getattr(self, name)} is too small")
-        if self.densification not in DENSIFICATIONS:
-            raise InputError(f'refine.densification "{self.densification}" must be one of {", ".join(DENSIFICATIONS)}')
-        if self.crop < 16 or self.batch < 1 or self.test_every < 2:
-            raise InputError("refine.crop must be at least 16, refine.batch at least 1, refine.test_every at least 2")
-        if not 0 <= self.sh_degree <= 3:
-            raise InputError(f"refine.sh_degree {self.sh_degree} must be 0, 1, 2 or 3")
-        if not 10 <= self.fov <= 120:
-            raise InputError(f"refine.fov {self.fov} must lie between 10 and 120 degrees")
+    size: int = setting(512, "side of a view", within="[16, 4096]", unit="pixels")
+    fov: float = setting(90.0, "of a view; six of 90 tile the sphere", within="[10, 120]", unit="degrees")
+    held_out_every: int = setting(16, "every so many-th view is not trained on, but evaluated", within="[2, inf)")
+
+
+@dataclass(frozen=True)
+class PhotometricConfig(Settings):
+    """The loss of a view: trust x ((1 - ssim) L1 + ssim D-SSIM), and regularisers."""
+
+    ssim: float = setting(0.2, "share of D-SSIM (3DGS)", within=_SHARE)
+    observed: float = setting(1.0, "trust in a pixel that the input saw", within=_POSITIVE)
+    restored: float = setting(0.5, "trust in a pixel that was guessed", within=_POSITIVE)
+    opacity: float = setting(0.0, "weight of the mean opacity; with mcmc its authors take 0.01", within=_POSITIVE)
+    scale: float = setting(0.0, "weight of the mean scale, in extents; likewise 0.01", within=_POSITIVE)
+
+
+@dataclass(frozen=True)
+class RatesConfig(Settings):
+    """Adam's learning rate for each kind of parameter."""
+
+    means: float = setting(1.6e-4, "times the scene's extent, decaying to means_end of it", within=_POSITIVE)
+    means_end: float = setting(0.01, "share of means' rate at the last step", within="(0, 1]")
+    scales: float = setting(5e-3, "of log scales", within=_POSITIVE)
+    opacities: float = setting(5e-2, "of opacity logits", within=_POSITIVE)
+    quats: float = setting(1e-3, "of quaternions", within=_POSITIVE)
+    sh: float = setting(2.5e-3, "of colour (degree 0)", within=_POSITIVE)
+    sh_rest: float = setting(1.25e-4, "of higher harmonics", within=_POSITIVE)
+
+
+@dataclass(frozen=True)
+class DensifyConfig(Settings):
+    """When and where Gaussians are added and taken away."""
+
+    start: int = setting(500, "first step at which it may happen", within=_POSITIVE)
+    stop: int = setting(13_000, "step from which it no longer happens", within=_POSITIVE)
+    every: int = setting(100, "steps between two times", within="[1, inf)")
+    gradient: float = setting(
+        2e-4, "mean means2d gradient over which one is cloned or split", within=_POSITIVE, unit="half image widths"
+    )
+    share: float = setting(0.05, "of the buffer, at most, added at a time", within="(0, 1]")
+    split_size: float = setting(0.01, "share of the extent over which one is split, not cloned", within=_POSITIVE)
+    prune_opacity: float = setting(0.005, "opacity under which a Gaussian is pruned", within="(0, 1)")
+    prune_size: float = setting(0.1, "share of the extent over which it is pruned, after a reset", within="(0, inf)")
+    reset_every: int = setting(3_000, "steps between opacity resets (default densification)", within="[1, inf)")
+    noise: float = setting(5e5, "of mcmc: how far means wander (Kheradmand et al. 2024, noise_lr)", within=_POSITIVE)
+
+
+@dataclass(frozen=True)
+class RefineConfig(Settings):
+    """Fitting the scene to views of the input and of the restored panoramas."""
+
+    steps: int = setting(15_000, "of the optimizer", within=_POSITIVE)
+    batch: int = setting(4, "views a step", within="[1, inf)")
+    devices: int = setting(1, "that share a step's views; 0 takes all", within=_POSITIVE)
+    evaluate_every: int = setting(5_000, "steps between held-out evaluations", within="[1, inf)")
+    plateau: float = setting(
+        0.0, "stop when `patience` evaluations in a row brought less; 0: never", within=_POSITIVE, unit="dB"
+    )
+    patience: int = setting(2, "evaluations that must bring too little", within="[1, inf)")
+    sh_degree: int = setting(3, "of the harmonics of colour", within="[0, 3]")
+    sh_degree_every: int = setting(1_000, "steps before the next degree joins in (3DGS)", within="[1, inf)")
+    # Finer than the sampling of what was observed is noise that shows from elsewhere (Mip-Splatting, Sec. 5.1).
+    min_scale: float = setting(0.8, "share of the size it was lifted with below which none shrinks", within=_POSITIVE)
+    # Fitting sharpens what was seen to the input's own sampling, which costs up to 0.3 dB elsewhere.
+    freeze_observed: bool = setting(False, "whether what the input saw stays as it was lifted")
+    max_count: int = setting(0, "Gaussians: those that views need least are left out; 0: no limit", within=_POSITIVE)
+    spare: float = setting(1.0, "free slots, as a share of the Gaussians it starts with", within=_POSITIVE)
+    densification: str = setting(
+        "default", "clone and split (3DGS); mcmc: relocation under a hard cap", among=("none", "default", "mcmc")
+    )
+    densify: DensifyConfig = DensifyConfig()
+    views: ViewsConfig = ViewsConfig()
+    loss: PhotometricConfig = PhotometricConfig()
+    rates: RatesConfig = RatesConfig()

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import optax
 
 from rein3d_jax.geometry.rotations import matrix_from_quats
-from rein3d_jax.refine.config import RefineConfig
+from rein3d_jax.refine.config import DensifyConfig
 from rein3d_jax.refine.state import RefineState
 
 SHRINK = 1.6  # a split Gaussian's children have 1/1.6 of its scale (3DGS)
@@ -23,18 +23,18 @@ def forget(optimizer: optax.OptState, slots: jax.Array) -> optax.OptState:
     return jax.tree.map(clear, optimizer)
 
 
-def _densify(state: RefineState, extent: jax.Array, key: jax.Array, *, config: RefineConfig):
+def _densify(state: RefineState, key: jax.Array, *, config: DensifyConfig):
     """Grow where the 2D gradient is high, prune what is faint: (state, counts).
 
     A high-gradient Gaussian smaller than `split_size` x extent is cloned; a larger one is split into two drawn from
-    it. Each takes ONE free slot; the steepest go first, `densify_share` of the buffer at most, the rest next time.
+    it. Each takes ONE free slot; the steepest go first, `share` of the buffer at most, the rest next time.
     Those that found no slot are counted as overflow.
     """
     parameters, alive = state.parameters, state.alive
     count = alive.shape[0]
     mean_gradient = jnp.where(alive, state.gradient_sum / jnp.maximum(state.seen, 1.0), 0.0)
-    wanted = (mean_gradient > config.densify_gradient) & ~state.fixed
-    room = max(int(config.densify_share * count), 1)
+    wanted = (mean_gradient > config.gradient) & ~state.fixed
+    room = max(int(config.share * count), 1)
     steepest, parents = jax.lax.top_k(jnp.where(wanted, mean_gradient, 0.0), room)
     free = jnp.nonzero(~alive, size=room, fill_value=count)[0]
     placed = (steepest > 0) & (free < count)
@@ -42,7 +42,7 @@ def _densify(state: RefineState, extent: jax.Array, key: jax.Array, *, config: R
     parent = jnp.where(placed, parents, count)
 
     size = jnp.exp(jnp.max(parameters["log_scales"][parents], axis=-1))
-    split = (size > config.split_size * extent)[:, None]
+    split = (size > config.split_size * state.extent)[:, None]
     offsets = _draw(parameters, parents, key)  # (2, room, 3)
     shrink = jnp.where(split, jnp.log(SHRINK), 0.0)
     children = {name: value[parents] for name, value in parameters.items()}
@@ -60,7 +60,7 @@ def _densify(state: RefineState, extent: jax.Array, key: jax.Array, *, config: R
     fresh = fresh.at[jnp.where(split[:, 0], parent, count)].set(True, mode="drop")
 
     faint = jax.nn.sigmoid(grown["opacity_logits"]) < config.prune_opacity
-    huge = jnp.exp(jnp.max(grown["log_scales"], axis=-1)) > config.prune_size * extent
+    huge = jnp.exp(jnp.max(grown["log_scales"], axis=-1)) > config.prune_size * state.extent
     pruned = alive & ~state.fixed & (faint | (huge & (state.step > config.reset_every)))
     zeros = jnp.zeros(count)
     counts = {"added": placed.sum(), "pruned": pruned.sum(), "overflow": (steepest > 0).sum() - placed.sum()}

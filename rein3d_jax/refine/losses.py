@@ -19,9 +19,3 @@ def photometric_loss(image: jax.Array, target: jax.Array, weight: jax.Array, *, 
     dissimilar = jnp.mean(inner * jnp.mean(1 - ssim_map(image, known), axis=-1))
     return (1 - ssim_weight) * absolute + ssim_weight * dissimilar
 
-
-def distance_loss(distance: jax.Array, target: jax.Array) -> jax.Array:
-    """(h, w) metres each -> (): mean |log distance / target| where both are known (> 0). The unit does not matter."""
-    known = (distance > 0) & (target > 0)
-    ratio = jnp.where(known, distance, 1.0) / jnp.where(known, target, 1.0)
-    return jnp.mean(jnp.abs(jnp.log(ratio)))

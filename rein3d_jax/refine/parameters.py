@@ -36,15 +36,16 @@ def with_sh_degree(gaussians: Gaussians, degree: int) -> Gaussians:
 
 def make_optimizer(config: RefineConfig) -> optax.GradientTransformation:
     """Adam with the paper's rates by parameter; the means' rate is for a scene of extent 1 and decays."""
-    decay = config.means_rate_end ** (1 / max(config.steps, 1))
+    chosen = config.rates
+    decay = chosen.means_end ** (1 / max(config.steps, 1))
     rates = {
-        "means": optax.exponential_decay(config.means_rate, 1, decay),
-        "log_scales": config.scales_rate,
-        "quats": config.quats_rate,
-        "opacity_logits": config.opacities_rate,
-        "sh": config.sh_rate,
-        "sh_rest": config.sh_rest_rate,
+        "means": optax.exponential_decay(chosen.means, 1, decay),
+        "log_scales": chosen.scales,
+        "quats": chosen.quats,
+        "opacity_logits": chosen.opacities,
+        "sh": chosen.sh,
+        "sh_rest": chosen.sh_rest,
     }
-    # eps 1e-15 as in 3DGS: a Gaussian seen by few pixels has gradients far below Adam's usual 1e-8.
+    # eps 1e-15 as in 3DGS: a Gaussian seen by few pixels has gradients far below Adam's default 1e-8.
     transforms = {name: optax.adam(rate, eps=1e-15) for name, rate in rates.items()}
     return optax.multi_transform(transforms, {name: name for name in rates})

@@ -19,18 +19,6 @@ def contribution(gaussians: Gaussians, cameras: Sequence[Camera], *, config: Ras
 
 
 @jax.jit
-def prune_within(gaussians: Gaussians, weight: jax.Array, tolerance: float) -> Gaussians:
-    """Without the faintest, by `contribution`, that add no more than `tolerance` together.
-
-    Colours lie in [0, 1] and what stood behind a Gaussian takes its place, so the views change by no more than
-    `tolerance` in the mean over their pixels: 0.002 is half of one of 255 grey levels.
-    """
-    order = jnp.argsort(jnp.where(gaussians.alive, weight, 0.0))
-    dropped = jnp.cumsum(jnp.where(gaussians.alive, weight, 0.0)[order]) <= tolerance
-    return gaussians.replace(alive=gaussians.alive & ~jnp.zeros_like(gaussians.alive).at[order].set(dropped))
-
-
-@jax.jit
 def prune_to(gaussians: Gaussians, weight: jax.Array, count: int) -> Gaussians:
     """The `count` that add most, by `contribution`; all where there are no more."""
     rank = jnp.argsort(jnp.argsort(jnp.where(gaussians.alive, -weight, jnp.inf)))

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from rein3d_jax.geometry.rotations import matrix_from_quats
-from rein3d_jax.refine.config import RefineConfig
+from rein3d_jax.refine.config import DensifyConfig, RefineConfig
 from rein3d_jax.refine.densify import forget
 from rein3d_jax.refine.state import RefineState
 
@@ -34,10 +34,10 @@ def shared(opacity: jax.Array, copies: jax.Array) -> tuple[jax.Array, jax.Array]
     return each, opacity / jnp.sum(jnp.asarray(table, jnp.float32)[copies] * powers, axis=-1)
 
 
-def _relocate(state: RefineState, extent: jax.Array, key: jax.Array, *, config: RefineConfig):
+def _relocate(state: RefineState, key: jax.Array, *, config: DensifyConfig):
     """Move the faint, and grow by GROWTH while slots are free: (state, counts). Sources are drawn by opacity.
 
-    `extent` is not used: relocation has no length. The buffer is the cap; nothing can overflow it.
+    The buffer is the cap; nothing can overflow it.
     """
     parameters, alive = state.parameters, state.alive
     count = alive.shape[0]
@@ -69,14 +69,14 @@ def _relocate(state: RefineState, extent: jax.Array, key: jax.Array, *, config: 
     return new, counts
 
 
-def explore(state: RefineState, extent: jax.Array, key: jax.Array, *, config: RefineConfig) -> jax.Array:
+def wander(state: RefineState, key: jax.Array, *, config: RefineConfig) -> jax.Array:
     """(n, 3) metres that the means move by chance after a step: along each Gaussian's own covariance, gated by low
     opacity (their eq. 8). Divided by the extent, so that the unit of length does not matter."""
     parameters = state.parameters
     opacity = jax.nn.sigmoid(parameters["opacity_logits"])
     gate = jax.nn.sigmoid(STEEPNESS * (THRESHOLD - opacity))
-    decay = config.means_rate_end ** (state.step / max(config.steps, 1))
-    size = config.noise * config.means_rate * decay / extent * gate
+    decay = config.rates.means_end ** (state.step / max(config.steps, 1))
+    size = config.densify.noise * config.rates.means * decay / state.extent * gate
     axes = matrix_from_quats(parameters["quats"]) * jnp.exp(parameters["log_scales"])[:, None]
     along = jnp.einsum("nji,nj->ni", axes, jax.random.normal(key, parameters["means"].shape), precision="highest")
     return jnp.einsum("nij,nj->ni", axes, along, precision="highest") * size[:, None]

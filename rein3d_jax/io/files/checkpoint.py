@@ -1,4 +1,4 @@
-"""Any pytree of arrays to one NPZ file and back; leaves are named by their jax.tree_util key paths."""
+"""Any pytree of arrays and words to one NPZ file and back; leaves are named by their jax.tree_util key paths."""
 
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ def save(path: str | Path, tree: Any) -> None:
     types (key data, not typed keys). Raises InputError if the file cannot be written."""
     arrays = {name: np.asarray(leaf) for name, leaf in _named_leaves(tree).items()}
     for name, array in arrays.items():
-        assert array.dtype.kind in "biufc", f"{name} is {array.dtype}, which NPZ cannot hold"
+        assert array.dtype.kind in "biufcU", f"{name} is {array.dtype}, which NPZ cannot hold"
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
         np.savez(file, allow_pickle=False, **arrays)
 
@@ -30,11 +30,14 @@ def load(path: str | Path, like: Any) -> Any:
     headers = read_headers(path)
     _check_fit(path, {name: header.dtype for name, header in headers.items()}, wanted)
     arrays = read_arrays(path, list(wanted))
-    leaves = [
-        array if isinstance(leaf, np.ndarray | np.generic | int | float | complex) else jnp.asarray(array)
-        for array, leaf in zip(arrays, wanted.values(), strict=True)
-    ]
+    leaves = [_as(leaf, array) for leaf, array in zip(wanted.values(), arrays, strict=True)]
     return jax.tree.unflatten(jax.tree.structure(like), leaves)
+
+
+def _as(leaf: Any, array: np.ndarray) -> Any:
+    if isinstance(leaf, str):
+        return str(array)
+    return array if isinstance(leaf, np.ndarray | np.generic | int | float | complex) else jnp.asarray(array)
 
 
 def _named_leaves(tree: Any) -> dict[str, Any]:
@@ -43,6 +46,7 @@ def _named_leaves(tree: Any) -> dict[str, Any]:
 
 def _check_fit(path: Path, stored: dict[str, np.dtype], wanted: dict[str, Any]) -> None:
     dtypes = {name: np.dtype(getattr(leaf, "dtype", type(leaf))) for name, leaf in wanted.items()}
+    stored = {name: np.dtype(str) if dtype.kind == "U" else dtype for name, dtype in stored.items()}
     faults = [f"lacks {name}" for name in dtypes.keys() - stored.keys()]
     faults += [f"has {name}, which is unknown" for name in stored.keys() - dtypes.keys()]
     both = dtypes.keys() & stored.keys()

@@ -1,0 +1,20 @@
+"""Everything that decides what the main job makes."""
+
+from dataclasses import dataclass
+
+from experiments.reconstruct.budget import BudgetConfig
+from experiments.reconstruct.flythrough import FilmConfig
+from experiments.reconstruct.inputs import InputConfig
+from rein3d_jax.pipeline.stages import Stages
+from rein3d_jax.settings import setting
+
+
+@dataclass(frozen=True)
+class ReconstructConfig(Stages):
+    """The whole job: its input, one config for each stage, where it writes, and its seed."""
+
+    output: str = setting("runs/room", "folder that it writes")
+    seed: int = setting(0, "of everything random", within="[0, 4294967295]")
+    input: InputConfig = InputConfig()
+    film: FilmConfig = FilmConfig()
+    budget: BudgetConfig = BudgetConfig()

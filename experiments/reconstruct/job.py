@@ -1,0 +1,124 @@
+"""The main job on files: reads, runs the stages, saves each when it is done, writes what a person opens."""
+
+import dataclasses
+import importlib.metadata
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import jax
+import numpy as np
+
+from experiments.config import dump_config
+from experiments.reconstruct.budget import OUT_OF_TIME, Clock, within
+from experiments.reconstruct.config import ReconstructConfig
+from experiments.reconstruct.inputs import input_fingerprint, input_panorama, input_views
+from experiments.reconstruct.outputs import write_outputs
+from experiments.reconstruct.progress import Progress
+from experiments.reconstruct.run import Run
+from experiments.reconstruct.stage_store import StageStore
+from experiments.restorer_network import read_network, weights_fingerprint
+from rein3d_jax.explore.trajectories import radial_trajectories
+from rein3d_jax.io.files.atomic import write_text
+from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
+from rein3d_jax.pipeline.reconstruct import ALL_PATHS, Reconstruction, joined
+from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene
+from rein3d_jax.pipeline.survey import Survey, lift_scene, room_background, with_distance
+from rein3d_jax.refine import Snapshot, evaluate_held_out
+from rein3d_jax.restore import restorer
+
+PACKAGES = ("rein3d-jax", "jax", "jaxlib", "flax", "optax", "numpy", "opencv-contrib-python-headless", "OpenImageIO")
+
+
+@dataclasses.dataclass(frozen=True)
+class _Job:
+    """What its stages share."""
+
+    config: ReconstructConfig
+    store: StageStore
+    progress: Progress
+    clock: Clock
+
+    def stage(self, name: str, depends, make):
+        """The result of a stage, told to whoever watches."""
+        result = self.store.run(name, depends, make)
+        self.progress.done(self.store.finished[-1])
+        return result
+
+    def settings(self, stage: str) -> dict:
+        """Those of a stage, as its key takes them."""
+        return dataclasses.asdict(getattr(self.config, stage))
+
+
+def run_job(config: ReconstructConfig, *, resume: bool = False) -> dict:
+    """Run the job; returns what metrics.json holds. Raises InputError for whatever is wrong with the input."""
+    clock, output = Clock(config.budget), Path(config.output)
+    views = input_views(config.input)  # a bad view is found before the long part
+    files = input_fingerprint(config.input)
+    write_text(output / "config.toml", _header() + dump_config(config))
+    config = within(config, config.budget)
+    with Progress(config) as progress:
+        store = StageStore(output / "stages", config.refine, resume=resume)
+        job = _Job(config, store, progress, clock)
+        metrics = write_outputs(Run(config, *_stages(job, files), views), store, clock)
+        progress.finish(output, metrics)
+    return metrics
+
+
+def _header() -> str:
+    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in PACKAGES)
+    return f"# written by rein3d_jax; Python {sys.version.split()[0]}, {versions}; jax on {jax.default_backend()}\n"
+
+
+def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool]:
+    """Everything up to the refined scene, and whether the distance was fitted."""
+    config, key = job.config, jax.random.key(job.config.seed)
+    depends = [files, config.input.height, job.settings("depth"), job.settings("shell"), jax.__version__]
+    panorama, fitted = job.stage("read", depends, lambda: _read(config))
+    coarse = job.stage("lift", job.settings("lift"), lambda: lift_scene(panorama, config.lift))
+    trajectories = job.stage(
+        "explore", job.settings("explore"), lambda: radial_trajectories(panorama, config=config.explore)
+    )
+    known = Survey(panorama, coarse, trajectories)
+    explored = list(_explored(job, known, jax.random.fold_in(key, 0)))
+    scene, curves, stopped = job.stage(
+        "refine", job.settings("refine"), lambda: _refined(job, known, explored, jax.random.fold_in(key, 1))
+    )
+    why = ALL_PATHS if len(explored) == config.explore.trajectories else OUT_OF_TIME
+    return joined(known, explored, (scene, curves, stopped), why), bool(fitted[0])
+
+
+def _read(config: ReconstructConfig):
+    panorama, fitted = with_distance(input_panorama(config.input), config)
+    return panorama, np.array([fitted])
+
+
+def _explored(job: _Job, known: Survey, key: jax.Array) -> Iterator[Explored]:
+    """The state after each trajectory, read where it was saved; the first one is never left out."""
+    config, last = job.config, None
+    background = room_background(known.panorama, config.restore)
+    restore = restorer(config.restore, background, read_network(config.restore))
+    shared = [job.settings("restore"), weights_fingerprint(config.restore), job.settings("rasterize"), config.seed]
+    for index in range(config.explore.trajectories):
+        if index and job.clock.explored():
+            return
+        states = explore_and_restore(known, restore, key, stages=config, start=last)
+        last = job.stage(f"restore-{index:02d}", [*shared, index], lambda states=states: next(states))
+        yield last
+
+
+def _refined(job: _Job, known: Survey, explored: list[Explored], key: jax.Array):
+    """(scene, curves, why it ended), a snapshot saved at each held-out evaluation."""
+    config, panorama = job.config, known.panorama
+    views = collect_views(panorama, [state.video for state in explored], stages=config)
+    unfinished: Snapshot | None = job.store.unfinished()
+    start = explored[-1].scene if unfinished is None else unfinished
+    for last in refine_scene(start, views, panorama, key, stages=config):
+        job.progress.step(last.step)
+        if last.evaluated and not last.stopped:
+            job.store.save_unfinished(last)
+        if not last.stopped and job.clock.refined():
+            last = evaluate_held_out(last, views, config=config.refine, raster=config.rasterize)
+            last = last.replace(stopped=OUT_OF_TIME)
+            break
+    return last.scene, last.curves, last.stopped

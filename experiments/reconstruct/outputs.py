@@ -1,0 +1,70 @@
+"""What a person opens: scene.ply, flythrough.mp4, viewer.html, report.html, metrics.json, in the order in which one
+would miss them."""
+
+import json
+import time
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from experiments.config import recipe_digest
+from experiments.reconstruct import run_metrics
+from experiments.reconstruct.budget import Clock
+from experiments.reconstruct.flythrough import flythrough
+from experiments.reconstruct.quality import quality, render_views
+from experiments.reconstruct.run import Pictures, Run
+from experiments.reconstruct.run_report import longest, run_report
+from experiments.reconstruct.stage_store import StageStore
+from experiments.reconstruct.viewer_page import viewer_page
+from rein3d_jax.evaluate.coverage import coverage
+from rein3d_jax.explore.trajectories import Trajectories
+from rein3d_jax.io.files.atomic import write_text
+from rein3d_jax.io.pictures.video import write_mp4
+from rein3d_jax.io.splats.ply import write_ply
+from rein3d_jax.pipeline.stages import render_video
+from rein3d_jax.report.report import render_report
+from rein3d_jax.scene import Gaussians
+
+
+def write_outputs(run: Run, store: StageStore, clock: Clock) -> dict:
+    """Every file of the run's folder; returns what metrics.json holds."""
+    begun, config, result, output = time.perf_counter(), run.config, run.result, Path(run.config.output)
+    write_ply(output / "scene.ply", result.scene, antialias=config.rasterize.antialias)
+    film = flythrough(result.scene, result.trajectories, run.backdrop, film=config.film, config=config.rasterize)
+    write_mp4(output / "flythrough.mp4", film, config.film.rate)
+    scenes = (result.coarse, result.scene)
+    truths = [render_views(scene, run.views, run.backdrop, config=config.rasterize) for scene in scenes]
+    ends = _ends(result.trajectories)
+    (coarse_ends, seen), (refined_ends, covered) = (_panoramas(scene, ends, config) for scene in scenes)
+    metrics = {
+        **run_metrics.cost(store),
+        **run_metrics.size(result, output / "scene.ply"),
+        **run_metrics.trouble(result),
+        **run_metrics.choices(result, store, config.explore),
+        "distance": "room-shell estimate" if run.fitted else "given",
+        "recipe": recipe_digest(output / "config.toml"),
+        "coverage": {"coarse": round(seen, 4), "refined": round(covered, 4)},
+    }
+    if run.views:
+        metrics["quality"] = {n: quality(p, run.views) for n, p in zip(("coarse", "refined"), truths, strict=True)}
+    metrics["seconds"]["write"] = round(time.perf_counter() - begun, 3)
+    metrics["seconds"]["total"] = round(clock.elapsed(), 3)
+    write_text(output / "viewer.html", viewer_page(run))
+    pictures = Pictures(coarse_ends, refined_ends, *truths)
+    write_text(output / "report.html", render_report(run_report(run, pictures, metrics)))
+    write_text(output / "metrics.json", json.dumps(metrics, indent=2) + "\n")
+    return metrics
+
+
+def _ends(trajectories: Trajectories) -> jax.Array:
+    """(k, 4, 4) poses at the ends of the longest trajectories."""
+    chosen = longest(trajectories)
+    return jnp.stack([trajectories.world_from_camera[i, int(trajectories.counts[i]) - 1] for i in chosen])
+
+
+def _panoramas(scene: Gaussians, poses: jax.Array, config) -> tuple[list, float]:
+    """What the scene shows there, holes black; and the share of the sphere that it covers, the poses' mean."""
+    video, _ = render_video(scene, poses, config.restore.height, config.rasterize)
+    return list(np.asarray(video.rgb * video.alpha[..., None])), float(jnp.mean(coverage(video.alpha)))

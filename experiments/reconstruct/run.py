@@ -1,0 +1,37 @@
+"""A finished job, and the pictures of it that its report shows."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from experiments.reconstruct.config import ReconstructConfig
+from rein3d_jax.io.rooms.traced_room import View
+from rein3d_jax.pipeline.reconstruct import Reconstruction
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """What a job made, and what it was asked for."""
+
+    config: ReconstructConfig
+    result: Reconstruction
+    fitted: bool  # whether the distance is a fitted box's
+    views: list[View]  # ground truth
+
+    @property
+    def backdrop(self) -> jax.Array:
+        """(3,) sRGB of what no splat covers."""
+        return jnp.mean(self.result.panorama.rgb, axis=(0, 1))
+
+
+@dataclasses.dataclass(frozen=True)
+class Pictures:
+    """Of the lifted and of the refined scene: panoramas at the ends of the longest paths, holes black, and what the
+    ground-truth views show."""
+
+    coarse_ends: list[np.ndarray]
+    refined_ends: list[np.ndarray]
+    coarse_views: list[np.ndarray]
+    refined_views: list[np.ndarray]

@@ -1,0 +1,71 @@
+"""One panorama in, one scene out: all stages joined, pure of files."""
+
+from collections import deque
+
+import jax
+from flax import struct
+
+from rein3d_jax.explore.trajectories import Trajectories
+from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
+from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene
+from rein3d_jax.pipeline.stages import Stages
+from rein3d_jax.pipeline.survey import Survey, room_background, survey, with_distance
+from rein3d_jax.refine import Curves
+from rein3d_jax.restore import TrainedNetwork, restorer
+from rein3d_jax.scene import Gaussians, Panorama, Video
+
+ALL_PATHS = "all paths taken"
+
+
+@struct.dataclass
+class Decisions:
+    """Why the stages did as much as they did."""
+
+    revealed: tuple[float, ...]  # share of the sphere that was open at each path's end, before it was restored
+    explored: str  # why exploring ended
+    refined: str  # why refining ended
+    overflow: int  # Gaussians that exploring found no slot for
+
+
+@struct.dataclass
+class Reconstruction:
+    """A scene, and what it was made from. It stands here, not in scene.py, since its parts are several stages'."""
+
+    panorama: Panorama  # its distance complete
+    coarse: Gaussians  # the panorama, lifted
+    trajectories: Trajectories
+    videos: tuple[Video, ...]  # the restored panoramas along each trajectory
+    scene: Gaussians
+    curves: Curves
+    decisions: Decisions
+
+
+def reconstruct(
+    panorama: Panorama, key: jax.Array, *, stages: Stages = Stages(), network: TrainedNetwork | None = None
+) -> Reconstruction:
+    """The scene of a panorama (h, 2 h): lifted, explored, restored and refined (paper Sec. 3).
+
+    Distances that are not `valid` are completed; where none is, an empty box is fitted to the picture. `network` is the
+    trained restorer, where stages.restore names one. Runs outside jit; every stage in it is compiled. The same key
+    gives the same bytes.
+    """
+    panorama, _ = with_distance(panorama, stages)
+    known = survey(panorama, stages)
+    restore = restorer(stages.restore, room_background(panorama, stages.restore), network)
+    explore_key, refine_key = (jax.random.fold_in(key, i) for i in range(2))
+    explored = list(explore_and_restore(known, restore, explore_key, stages=stages))
+    views = collect_views(panorama, [state.video for state in explored], stages=stages)
+    (last,) = deque(refine_scene(explored[-1].scene, views, panorama, refine_key, stages=stages), maxlen=1)
+    return joined(known, explored, (last.scene, last.curves, last.stopped))
+
+
+def joined(
+    known: Survey, explored: list[Explored], refined: tuple[Gaussians, Curves, str], why: str = ALL_PATHS
+) -> Reconstruction:
+    """The reconstruction of what each stage gave: the states after each path and `why` there are no more; the refined
+    scene, its curves and why refining ended."""
+    scene, curves, stopped = refined
+    revealed = tuple(round(float(state.revealed), 4) for state in explored)
+    decisions = Decisions(revealed, why, stopped, int(explored[-1].overflow))
+    videos = tuple(state.video for state in explored)
+    return Reconstruction(known.panorama, known.coarse, known.trajectories, videos, scene, curves, decisions)

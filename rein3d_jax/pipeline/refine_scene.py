@@ -1,0 +1,71 @@
+"""The scene with its guesses, refined: the views it is fitted to, how large it may be, what stays as it is."""
+
+from collections.abc import Iterator, Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from rein3d_jax.explore.hidden import on_observed
+from rein3d_jax.lift import compact, with_capacity
+from rein3d_jax.parallel import data_mesh
+from rein3d_jax.pipeline.devices import steps_over
+from rein3d_jax.pipeline.stages import Stages, origin_pose
+from rein3d_jax.rasterize import bucket
+from rein3d_jax.refine import Snapshot, Views, first_snapshot, join_views, refine, views_from_panorama
+from rein3d_jax.refine.prune import contribution, prune_to
+from rein3d_jax.refine.step import take_step
+from rein3d_jax.refine.views import camera_of
+from rein3d_jax.scene import Gaussians, Panorama, Video
+
+_GOLDEN_ANGLE = 2.399963  # radians: successive multiples spread the cuts between a trajectory's views evenly
+_WEIGHED = 48  # views, evenly through the list, by which a scene is pruned
+
+
+def collect_views(panorama: Panorama, videos: Sequence[Video], *, stages: Stages) -> Views:
+    """Views of the input panorama and of every restored frame but the origin's, weighed by trust."""
+    config, trust = stages.refine.views, stages.refine.loss
+    seen = (panorama.rgb, trust.observed * jnp.ones(panorama.distance.shape), origin_pose())
+    parts = [views_from_panorama(*seen, yaw=yaw, config=config) for yaw in (0.0, jnp.pi / 4)]
+    for video in videos:
+        weight = jnp.where(video.alpha >= stages.restore.observed, trust.observed, trust.restored)
+        weight = jnp.where(video.distance > 0, weight, 0.0)
+        for index in range(1, video.rgb.shape[0]):
+            frame = (video.rgb[index], weight[index], video.world_from_camera[index])
+            yaw = float((index * _GOLDEN_ANGLE) % (jnp.pi / 2))
+            parts.append(views_from_panorama(*frame, yaw=yaw, config=config))
+    return join_views(*parts)
+
+
+def scene_extent(panorama: Panorama) -> float:
+    """Metres: the median known distance, the length that rates and sizes are measured in."""
+    return float(jnp.nanmedian(jnp.where(panorama.valid, panorama.distance, jnp.nan)))
+
+
+def refine_scene(
+    start: Gaussians | Snapshot, views: Views, panorama: Panorama, key: jax.Array, *, stages: Stages
+) -> Iterator[Snapshot]:
+    """`refine`'s snapshots (paper Sec. 3.3) of the scene `start`, brought within its limits, or on from a snapshot."""
+    config, raster = stages.refine, stages.rasterize
+    if isinstance(start, Gaussians):
+        scene = _within_limits(start, views, stages)
+        fixed = on_observed(panorama, scene.means) if config.freeze_observed else None
+        extent = scene_extent(panorama)
+        start = first_snapshot(scene, views, extent=extent, config=config, raster=raster, fixed=fixed)
+    chosen = take_step if config.devices == 1 else steps_over(data_mesh(config.devices))
+    return refine(start, views, key, config=config, raster=raster, take_step=chosen)
+
+
+def _within_limits(scene: Gaussians, views: Views, stages: Stages) -> Gaussians:
+    """What the views need of the scene, `max_count` at most, in a buffer with room to grow. Buffers of rounded size:
+    the next scene's program is then compiled already."""
+    limit = stages.refine.max_count
+    if 0 < limit < int(scene.alive.sum()):
+        chosen = np.unique(np.linspace(0, len(views.rgb) - 1, _WEIGHED).astype(int))
+        cameras = [camera_of(views, int(i)) for i in chosen]
+        scene = prune_to(scene, contribution(scene, cameras, config=stages.rasterize), limit)
+    scene = compact(scene, spare=stages.refine.spare)
+    scene = with_capacity(scene, bucket(scene.alive.shape[0]))
+    if 0 < limit < scene.alive.shape[0]:
+        scene = jax.tree.map(lambda x: x[:limit], scene)  # the living come first
+    return scene

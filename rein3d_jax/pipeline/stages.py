@@ -1,0 +1,46 @@
+"""The stages' settings together, and what all stages share: the input's pose and panoramas rendered along poses."""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+
+from rein3d_jax.depth.complete import CompleteConfig
+from rein3d_jax.depth.room_shell import RoomShellConfig
+from rein3d_jax.explore.profile import ExploreConfig
+from rein3d_jax.geometry.poses import equirectangular_camera, rigid
+from rein3d_jax.geometry.sphere import world_from_camera_axes
+from rein3d_jax.lift import LiftConfig
+from rein3d_jax.rasterize import RasterizeConfig, render
+from rein3d_jax.refine import RefineConfig
+from rein3d_jax.restore import RestoreConfig
+from rein3d_jax.scene import Gaussians, Video
+from rein3d_jax.settings import Settings
+
+
+@dataclass(frozen=True)
+class Stages(Settings):
+    """One config for each stage."""
+
+    shell: RoomShellConfig = RoomShellConfig()  # where no distance is given
+    depth: CompleteConfig = CompleteConfig()
+    lift: LiftConfig = LiftConfig()
+    explore: ExploreConfig = ExploreConfig()
+    rasterize: RasterizeConfig = RasterizeConfig()
+    restore: RestoreConfig = RestoreConfig()
+    refine: RefineConfig = RefineConfig()
+
+
+def origin_pose() -> jax.Array:
+    """world_from_camera (4, 4) of the input panorama."""
+    return rigid(world_from_camera_axes(), jnp.zeros(3))
+
+
+def render_video(gaussians: Gaussians, poses: jax.Array, height: int, raster: RasterizeConfig):
+    """Panoramas along `poses` (t, 4, 4) -> (Video with colour un-premultiplied, the config with grown buffers)."""
+    frames = []
+    for pose in poses:
+        frame, raster = render(gaussians, equirectangular_camera(pose, height), config=raster)
+        frames.append((frame.rgb / jnp.maximum(frame.alpha, 1e-6)[..., None], frame.alpha, frame.distance))
+    rgb, alpha, distance = (jnp.stack(part) for part in zip(*frames, strict=True))
+    return Video(jnp.clip(rgb, 0, 1), alpha, distance, poses), raster

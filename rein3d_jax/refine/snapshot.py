@@ -1,0 +1,73 @@
+"""The refinement between two steps: enough to go on to the same bytes, and what has been seen on the way."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+
+from rein3d_jax.rasterize import RasterizeConfig, allocate
+from rein3d_jax.refine.config import RefineConfig
+from rein3d_jax.refine.parameters import join_parameters, with_sh_degree
+from rein3d_jax.refine.state import RefineState, initial_state
+from rein3d_jax.refine.views import Views, camera_of
+from rein3d_jax.scene import Gaussians
+
+_ALLOCATED_BY = 24  # views, evenly through the list; a greedier one grows the buffers when it comes
+
+
+@struct.dataclass
+class Curves:
+    """What was measured, as rows of (step, value), and what went wrong, as totals."""
+
+    loss: np.ndarray  # (k, 2) of each step
+    psnr: np.ndarray  # (k, 2) dB at the held-out views
+    count: np.ndarray  # (k, 2) Gaussians, at each held-out evaluation
+    overflow: np.ndarray  # () Gaussians that densification had no slot for
+    reallocated: np.ndarray  # () times that the rasterizer's buffers grew
+    skipped: np.ndarray  # () steps whose gradient was not finite
+
+
+@struct.dataclass
+class Snapshot:
+    """The refinement's state."""
+
+    state: RefineState
+    buffers: jax.Array  # (4,) the rasterizer's sizes: sums over buffers of another size round otherwise
+    curves: Curves
+    stopped: str  # why it ended; "" while it goes on
+
+    @property
+    def scene(self) -> Gaussians:
+        """The Gaussians as they are now."""
+        return join_parameters(self.state.parameters, self.state.alive)
+
+    @property
+    def step(self) -> int:
+        """Steps taken."""
+        return int(self.state.step)
+
+    @property
+    def evaluated(self) -> bool:
+        """Whether the held-out views have been evaluated at this very step."""
+        return len(self.curves.psnr) > 0 and self.curves.psnr[-1, 0] == self.step
+
+
+def first_snapshot(
+    gaussians: Gaussians, views: Views, *, extent: float, config: RefineConfig, raster: RasterizeConfig, fixed=None
+) -> Snapshot:
+    """The refinement of `gaussians` before its first step. `extent` is the scene's size in metres; `fixed` (n,) bool
+    or None are the Gaussians that stay as they are."""
+    state = initial_state(with_sh_degree(gaussians, config.sh_degree), config, extent=extent, fixed=fixed)
+    chosen = np.unique(np.linspace(0, views.rgb.shape[0] - 1, _ALLOCATED_BY).astype(int))
+    cameras = [camera_of(views, int(i)) for i in chosen]
+    raster = allocate(join_parameters(state.parameters, state.alive), cameras, config=raster, slack=1.25)
+    rows, total = np.zeros((0, 2)), np.zeros(())
+    return Snapshot(state, jnp.array(raster.buffers), Curves(rows, rows, rows, total, total, total), "")
+
+
+def blank_snapshot(config: RefineConfig) -> Snapshot:
+    """A snapshot's structure and dtypes, with which to read one back."""
+    one, sh = jnp.ones(1), jnp.zeros((1, 1, 3))
+    scene = Gaussians(jnp.zeros((1, 3)), jnp.zeros((1, 3)), jnp.eye(1, 4), one, sh, one > 0)
+    state = initial_state(with_sh_degree(scene, config.sh_degree), config, extent=1.0)
+    return Snapshot(state, jnp.zeros(4, jnp.int32), Curves(*[np.zeros(0)] * 6), "")
