@@ -4,7 +4,7 @@ import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { build } from "esbuild";
 
-const PAGE = process.argv[2] ?? join(import.meta.dirname, "../../rein3d_jax/evaluate/viewer_page");
+const PAGE = process.argv[2] ?? join(import.meta.dirname, "../../rein3d_jax/report/viewer_page");
 const LIBRARIES = ["@sparkjsdev/spark", "three", "fflate"];
 
 const { outputFiles } = await build({
