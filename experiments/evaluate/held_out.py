@@ -12,7 +12,7 @@ from experiments.evaluate.room import EvaluationRoom
 from experiments.reconstruct.quality import AT_ORIGIN, is_novel
 from rein3d_jax.errors import InputError
 from rein3d_jax.evaluate.inverse_distance import sample_inverse_distance
-from rein3d_jax.evaluate.regions import split
+from rein3d_jax.evaluate.regions import regions_of_view
 from rein3d_jax.geometry.pinhole import pinhole_rays
 from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.geometry.sphere import rays_of_pose, world_from_camera_axes
@@ -73,7 +73,7 @@ def _panorama(room: EvaluationRoom, pano: PosedPanorama) -> HeldOutPicture:
 
 
 def _region(room: EvaluationRoom, camera: Camera, rays: jax.Array, distance: jax.Array) -> jax.Array:
-    return split(room.panorama, camera.world_from_camera[:3, 3], rays, distance)
+    return regions_of_view(room.panorama, camera.world_from_camera[:3, 3], rays, distance)
 
 
 def _pinhole_rays(camera: Camera) -> jax.Array:

@@ -20,7 +20,7 @@ from rein3d_jax.evaluate.coverage import coverage
 from rein3d_jax.evaluate.flicker import flicker
 from rein3d_jax.evaluate.no_reference.brisque import brisque
 from rein3d_jax.evaluate.no_reference.niqe import niqe
-from rein3d_jax.evaluate.regions import DISOCCLUDED, NEVER_SEEN, OBSERVED, split
+from rein3d_jax.evaluate.regions import DISOCCLUDED, NEVER_SEEN, OBSERVED, regions_of_view
 from rein3d_jax.explore.trajectories import radial_trajectories
 from rein3d_jax.explore.viewpoints import evaluation_viewpoints
 from rein3d_jax.geometry.poses import equirectangular_camera, pinhole_camera
@@ -132,7 +132,8 @@ def _clip_regions(room: EvaluationRoom, hole: jax.Array) -> jax.Array:
     video = room.degraded[0]
     poses = video.world_from_camera
     rays = jax.vmap(lambda pose: rays_of_pose(pose, *hole.shape[1:]))(poses)
-    known = jax.vmap(partial(split, room.clip_input))(poses[:, :3, 3], rays, jnp.where(hole, 0.0, video.distance))
+    region_of = jax.vmap(partial(regions_of_view, room.clip_input))
+    known = region_of(poses[:, :3, 3], rays, jnp.where(hole, 0.0, video.distance))
     return jnp.where(hole, DISOCCLUDED, jnp.where(known == NEVER_SEEN, NEVER_SEEN, OBSERVED))
 
 

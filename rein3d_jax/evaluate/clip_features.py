@@ -1,15 +1,13 @@
 """What of a clip the Frechet distance compares. The name says which: only I3D's features make it an FVD."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from rein3d_jax.evaluate.alexnet import alexnet
-from rein3d_jax.evaluate.i3d import SIDE, i3d
-
-Params = Mapping[str, jax.Array]
+from rein3d_jax.evaluate.i3d import SIDE, Params, i3d
 
 
 class ClipFeatures(NamedTuple):
@@ -34,7 +32,7 @@ def _i3d_features(params: Params, frames: jax.Array) -> jax.Array:
     return i3d(params, resized[None])[0]
 
 
-# params: io.metric_weights.lpips_weights; any t >= 2, h and w >= 31
+# params: io.weights.metric_weights.lpips_weights; any t >= 2, h and w >= 31
 ALEXNET = ClipFeatures("Frechet distance (AlexNet features)", _alexnet_features)
-# params: io.metric_weights.i3d_weights, from a file that the user converts; t >= 9
+# params: io.weights.metric_weights.i3d_weights, from a file that the user converts; t >= 9
 I3D = ClipFeatures("FVD (I3D)", _i3d_features)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from rein3d_jax.geometry.sphere import pixel_solid_angles
 
-NEAR_RATIO = 1.25  # the usual threshold of delta_1
+_NEAR_RATIO = 1.25  # the threshold of delta_1
 
 
 class DistanceErrors(NamedTuple):
@@ -20,7 +20,7 @@ class DistanceErrors(NamedTuple):
 
 @jax.jit
 def distance_errors(estimate: jax.Array, true: jax.Array, mask: jax.Array) -> DistanceErrors:
-    """(..., h, w), (..., h, w), (..., h, w) bool -> one value each for (...), pixels weighted by solid angle.
+    """Errors (...) of `estimate` (..., h, w) metres where `mask` (..., h, w), pixels weighted by solid angle.
 
     Pixels of unknown true distance never count. An estimate of 0, a hole, is an error unless the mask leaves it out.
     """
@@ -29,7 +29,7 @@ def distance_errors(estimate: jax.Array, true: jax.Array, mask: jax.Array) -> Di
     known = jnp.where(true > 0, true, 1.0)
     error = jnp.where(true > 0, estimate - true, 0.0)
     ratio = estimate / known
-    near = (ratio < NEAR_RATIO) & (ratio * NEAR_RATIO > 1)
+    near = (ratio < _NEAR_RATIO) & (ratio * _NEAR_RATIO > 1)
 
     def mean(values):
         return jnp.sum(weights * values, axis=(-2, -1)) / jnp.sum(weights, axis=(-2, -1))

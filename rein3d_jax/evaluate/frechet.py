@@ -5,14 +5,14 @@ import numpy as np
 
 
 def feature_statistics(features: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(n, d), n >= 2 -> mean (d,) and unbiased covariance (d, d), float64."""
+    """Mean (d,) and unbiased covariance (d, d), float64, of `features` (n, d), n >= 2."""
     features = np.asarray(features, np.float64)
     assert features.ndim == 2 and len(features) >= 2, f"{features.shape}: at least two feature vectors are needed"
     return features.mean(axis=0), np.atleast_2d(np.cov(features, rowvar=False))
 
 
 def frechet_distance(mean1: np.ndarray, cov1: np.ndarray, mean2: np.ndarray, cov2: np.ndarray) -> float:
-    """|m1 - m2|^2 + tr(C1 + C2 - 2 (C1 C2)^(1/2)) >= 0, means (d,), covariances (d, d) symmetric, singular or not.
+    """Distance |m1 - m2|^2 + tr(C1 + C2 - 2 (C1 C2)^(1/2)) >= 0; means (d,), covariances (d, d), singular or not.
 
     With C = A A^T by eigendecomposition the last trace is the sum of the singular values of A1^T A2: no root of a
     product that rounding has made asymmetric. Fewer samples than d bias the distance upwards: compare only distances of

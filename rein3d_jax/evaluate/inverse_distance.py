@@ -10,7 +10,7 @@ from rein3d_jax.geometry.sphere import pixels_from_rays
 
 def sample_inverse_distance(distance: jax.Array, rays: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Bilinear 1 / metres (...) of an equirectangular `distance` (h, w), 0 where unknown, in directions `rays`
-    (..., 3) of any length in its own unturned frame; and whether it is known there: most of the weight is."""
+    (..., 3) of any length in its own frame; and whether it is known there: most of the weight is."""
     known = distance > 0
     inverse = jnp.where(known, 1 / jnp.where(known, distance, 1.0), 0.0)
     u, v = pixels_from_rays(rays, *distance.shape)

@@ -16,7 +16,7 @@ class OverRooms(NamedTuple):
 
 @jax.jit
 def over_rooms(values: jax.Array) -> OverRooms:
-    """(rooms, ...) one value for each room, averaged over its views beforehand -> statistics (...).
+    """Statistics (...) of `values` (rooms, ...), one for each room, averaged over its views beforehand.
 
     An infinite value (the PSNR of equal images) makes the mean infinite and the error NaN.
     """

@@ -31,7 +31,7 @@ def test_they_are_their_definitions(maps):
 
 def test_the_truth_has_no_error_and_a_scale_a_known_one(maps):
     _, true, mask = maps
-    np.testing.assert_allclose(distance_errors(true, true, mask), (0, 0, 1), atol=1e-6)  # a quotient of equal sums
+    np.testing.assert_allclose(distance_errors(true, true, mask), (0, 0, 1), atol=3e-6)  # sums of 512: sqrt(512) * 6e-8
     errors = distance_errors(1.3 * true, true, mask)
     np.testing.assert_allclose(errors.abs_rel, 0.3, rtol=1e-5)  # float32
     assert errors.delta == 0
@@ -41,7 +41,7 @@ def test_a_hole_is_wrong_and_an_unknown_truth_does_not_count(maps):
     _, true, _ = maps
     everywhere = np.ones_like(true, bool)
     errors = distance_errors(np.zeros_like(true), true, everywhere)
-    np.testing.assert_allclose((errors.abs_rel, errors.delta), (1, 0), rtol=1e-6)
+    np.testing.assert_allclose((errors.abs_rel, errors.delta), (1, 0), rtol=3e-6)  # as above
     odd = np.where(true > 0, true, 1e6).astype(np.float32)
     assert distance_errors(odd, true, everywhere).rmse == 0
 

@@ -69,7 +69,7 @@ def test_ws_ssim_is_its_definition(pair):
     np.testing.assert_allclose(ws_ssim(*pair), total / weight, atol=1e-5)  # as above
 
 
-def test_turning_both_panoramas_changes_nothing():
+def test_yawing_both_panoramas_changes_nothing():
     rng = np.random.default_rng(2)
     image = rng.uniform(size=(128, 256, 3)).astype(np.float32)
     noisy = np.clip(image + rng.normal(0, 0.1, image.shape), 0, 1).astype(np.float32)
@@ -78,22 +78,23 @@ def test_turning_both_panoramas_changes_nothing():
         np.testing.assert_allclose(turned, metric(noisy, image), atol=1e-4)  # the same sums in another order
 
 
-def test_the_weights_of_rows_are_their_area():
-    """cos(latitude), summed, is the sphere's area to second order in the height of a pixel."""
-    rows = np.cos(np.pi * (0.5 - (np.arange(128) + 0.5) / 128))
-    np.testing.assert_allclose(rows.sum() * np.pi / 128 * 2 * np.pi, 4 * np.pi, rtol=(np.pi / 128) ** 2 / 24 * 1.01)
+def test_rows_weigh_by_their_area():
+    """An error above 30 degrees of latitude, on a quarter of the sphere, is a quarter of the error."""
+    image = jnp.zeros((96, 192, 3))
+    # The midpoint rule is right to (pi / 96)^2 / 24 = 5e-5 of the area, 2e-4 dB.
+    np.testing.assert_allclose(ws_psnr(image.at[:32].set(0.1), image), 20 + 10 * np.log10(4), atol=1e-3)
 
 
 def test_equal_images_are_perfect(pair):
     image, _ = pair
-    np.testing.assert_allclose(ssim(image, image), 1.0, atol=1e-6)  # rounding of a quotient of equal sums
-    np.testing.assert_allclose(ws_ssim(image, image), 1.0, atol=1e-6)
+    # a mean of 512 pixels whose quotients are 1 up to rounding: sqrt(512) * 6e-8
+    np.testing.assert_allclose([ssim(image, image), ws_ssim(image, image)], 1.0, atol=3e-6)
     assert psnr(image, image) == ws_psnr(image, image) == jnp.inf
 
 
 def test_ssim_is_symmetric_and_has_a_finite_gradient_at_its_maximum(pair):
     image, noisy = pair
-    np.testing.assert_allclose(ssim(image, noisy), ssim(noisy, image), rtol=1e-6)  # the same sums, other order
+    np.testing.assert_allclose(ssim(image, noisy), ssim(noisy, image), atol=1e-5)  # as in the definition's test
     gradient = jax.grad(ssim)(image, image)
     # The maximum is flat: what is left is rounding beside the 1e-3 or so of a gradient elsewhere.
     assert jnp.abs(gradient).max() < 1e-5 < jnp.abs(jax.grad(ssim)(noisy, image)).max()
@@ -135,6 +136,7 @@ def test_the_sphere_weighs_an_error_by_its_latitude():
 def test_coverage_is_a_share_of_the_sphere():
     alpha = jnp.zeros((HEIGHT, WIDTH))
     assert coverage(alpha) == 0
-    np.testing.assert_allclose(coverage(alpha.at[: HEIGHT // 2].set(1.0)), 0.5, atol=1e-6)  # float32 sum
+    atol = 3e-6  # two float32 sums of 512 areas, of share 1 at most: sqrt(512) * 6e-8 each
+    np.testing.assert_allclose(coverage(alpha.at[: HEIGHT // 2].set(1.0)), 0.5, atol=atol)
     quarter = (1 - np.sin(np.pi / 4)) / 2  # the cap above latitude 45 degrees
-    np.testing.assert_allclose(coverage(alpha.at[: HEIGHT // 4].set(0.6)), quarter, atol=1e-6)
+    np.testing.assert_allclose(coverage(alpha.at[: HEIGHT // 4].set(0.6)), quarter, atol=atol)

@@ -19,22 +19,22 @@ from rein3d_jax.evaluate.no_reference.natural_scene import (
     width_of_deviation,
 )
 
-GREY = (0.2125, 0.7154, 0.0721)  # scikit-image's rgb2gray, as in the package whose model this is
-CUBIC = (-0.09375, 0.59375, 0.59375, -0.09375)  # OpenCV's INTER_CUBIC (a = -3/4) at half size
+_GREY = (0.2125, 0.7154, 0.0721)  # scikit-image's rgb2gray, as in the package whose model this is
+_CUBIC = (-0.09375, 0.59375, 0.59375, -0.09375)  # OpenCV's INTER_CUBIC (a = -3/4) at half size
 
 
 @jax.jit
 def brisque(params: Mapping[str, jax.Array], image: jax.Array) -> jax.Array:
-    """(..., h, w, 3) sRGB in [0, 1] -> (...). `params` from `io.metric_weights.brisque_weights`. An odd last row or
-    column is left out. NaN for a flat picture."""
+    """BRISQUE (...) of images (..., h, w, 3), sRGB in [0, 1]; `params` are those of
+    `io.weights.metric_weights.brisque_weights`. An odd last row or column is left out. NaN for a flat picture."""
     return jnp.vectorize(partial(_of_one, params), signature="(h,w,c)->()")(image)
 
 
 def _of_one(params: Mapping[str, jax.Array], image: jax.Array) -> jax.Array:
     height, width = (size // 2 * 2 for size in image.shape[:2])
     exact = partial(jnp.matmul, precision=jax.lax.Precision.HIGHEST)
-    plane = 255 * exact(image[:height, :width], jnp.array(GREY))
-    features = _features([plane, halved(plane, CUBIC, beyond="edge")])
+    plane = 255 * exact(image[:height, :width], jnp.array(_GREY))
+    features = _features([plane, halved(plane, _CUBIC, beyond="edge")])
     scaled = 2 * (features - params["low"]) / (params["high"] - params["low"]) - 1
     # an epsilon-SVR: sum of coefficients exp(-gamma |x - vector|^2), less rho
     distances = jnp.sum((params["vectors"] - scaled) ** 2, axis=1)

@@ -8,8 +8,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-WINDOW, SIGMA = 7, 7 / 6
-STEADY = 1.0  # keeps the quotient finite where a picture is flat
+_WINDOW, _SIGMA = 7, 7 / 6
+_STEADY = 1.0  # keeps the quotient finite where a picture is flat
 
 _SHAPES = np.arange(0.2, 10.001, 0.001)  # the shapes that the authors' search allows
 _RATIOS = np.array([np.exp(2 * lgamma(2 / a) - lgamma(1 / a) - lgamma(3 / a)) for a in _SHAPES])
@@ -33,28 +33,28 @@ class Bell(NamedTuple):
 
 
 def normalised_brightness(plane: jax.Array, *, beyond: str) -> jax.Array:
-    """(h, w) in [0, 255] -> (I - mu) / (sigma + 1) (h, w), mu and sigma under a 7 x 7 Gaussian window (Mittal et al.
-    2012, eq. 1-3). `beyond` the border lies a jnp.pad mode's picture: "edge", or "constant" for 0.
+    """(I - mu) / (sigma + 1) (h, w) of a plane I (h, w) in [0, 255], mu and sigma under a 7 x 7 Gaussian window (Mittal
+    et al. 2012, eq. 1-3). `beyond` the border lies a jnp.pad mode's picture: "edge", or "constant" for 0.
 
     Differences to the middle pixel are summed, not values and squares: exactly 0 where flat, nothing cancels.
     """
-    reach = WINDOW // 2
-    padded = jnp.pad(plane, reach, mode=beyond)
+    margin = _WINDOW // 2
+    padded = jnp.pad(plane, margin, mode=beyond)
 
     def add(sums, tap):
         weight, row, column = tap
         difference = jax.lax.dynamic_slice(padded, (row, column), plane.shape) - plane
         return (sums[0] + weight * difference, sums[1] + weight * difference**2), None
 
-    rows, columns = np.mgrid[:WINDOW, :WINDOW]
-    bell = np.exp(-((rows - reach) ** 2 + (columns - reach) ** 2) / (2 * SIGMA**2))
+    rows, columns = np.mgrid[:_WINDOW, :_WINDOW]
+    bell = np.exp(-((rows - margin) ** 2 + (columns - margin) ** 2) / (2 * _SIGMA**2))
     taps = (jnp.asarray((bell / bell.sum()).ravel(), plane.dtype), rows.ravel(), columns.ravel())
     (mean, square), _ = jax.lax.scan(add, (jnp.zeros_like(plane), jnp.zeros_like(plane)), taps)
-    return -mean / (jnp.sqrt(jnp.maximum(square - mean**2, 0.0)) + STEADY)
+    return -mean / (jnp.sqrt(jnp.maximum(square - mean**2, 0.0)) + _STEADY)
 
 
 def moments(values: jax.Array, *, zero_is_right: bool) -> Moments:
-    """(h, w) -> scalars. A value of 0 is on the right or on neither side; NaN where a side is empty, as where flat."""
+    """Moments () of values (h, w); 0 is on the right or on neither side. NaN where a side is empty, as where flat."""
 
     def rms(side):
         return jnp.sqrt(jnp.sum(jnp.where(side, values**2, 0.0)) / jnp.sum(side))
@@ -64,7 +64,7 @@ def moments(values: jax.Array, *, zero_is_right: bool) -> Moments:
 
 
 def fit_bell(of: Moments) -> Bell:
-    """The asymmetric generalised Gaussians of moments (...), shapes within [0.2, 10] (Lasmar et al. 2009). One call for
+    """Asymmetric generalised Gaussians of moments (...), shapes within [0.2, 10] (Lasmar et al. 2009). One call for
     many compiles ten times as fast as many calls."""
     skew = of.left / of.right
     ratio = of.magnitude**2 / of.square * (skew**3 + 1) * (skew + 1) / (skew**2 + 1) ** 2
@@ -83,7 +83,7 @@ def mean_of_width(shape: jax.Array) -> jax.Array:
 
 
 def halved(plane: jax.Array, taps: tuple[float, ...], *, beyond: str) -> jax.Array:
-    """(h, w), both even -> (h / 2, w / 2): even-sized symmetric filter `taps` centred between each two pixels."""
+    """Half-size plane (h / 2, w / 2) of (h, w), both even, by an even symmetric filter `taps` between two pixels."""
     assert plane.shape[0] % 2 == plane.shape[1] % 2 == len(taps) % 2 == 0, plane.shape
     pad = len(taps) // 2 - 1
     for _ in plane.shape:  # rows, then columns

@@ -19,29 +19,30 @@ from rein3d_jax.evaluate.no_reference.natural_scene import (
     width_of_deviation,
 )
 
-BLOCK = 96  # pixels of a side, the authors' choice
-LUMA, BLACK = (65.481, 128.553, 24.966), 16.0  # ITU-R BT.601: Y of YCbCr, 16 to 235
+_BLOCK = 96  # pixels of a side, the authors' choice
+_LUMA, _BLACK = (65.481, 128.553, 24.966), 16.0  # ITU-R BT.601: Y of YCbCr, 16 to 235
 # MATLAB's imresize: Keys's cubic (a = -1/2) stretched by two, at 1/4, 3/4, 5/4, 7/4 of the coarser pixel's width
-CUBIC = (-0.01171875, -0.03515625, 0.11328125, 0.43359375, 0.43359375, 0.11328125, -0.03515625, -0.01171875)
-NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))  # right, down, and the two diagonals
+_CUBIC = (-0.01171875, -0.03515625, 0.11328125, 0.43359375, 0.43359375, 0.11328125, -0.03515625, -0.01171875)
+_NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))  # right, down, and the two diagonals
 
 
 @jax.jit
 def niqe(params: Mapping[str, jax.Array], image: jax.Array) -> jax.Array:
-    """(..., h, w, 3) sRGB in [0, 1] -> (...). `params` from `io.metric_weights.niqe_weights`.
+    """NIQE (...) of images (..., h, w, 3), sRGB in [0, 1]; `params`: `io.weights.metric_weights.niqe_weights`.
 
     Only whole blocks of 96 x 96 pixels count, at least two of them. NaN where fewer than two blocks have texture.
     """
-    assert (image.shape[-3] // BLOCK) * (image.shape[-2] // BLOCK) >= 2, f"{image.shape} has not two blocks of {BLOCK}"
+    rows, columns = image.shape[-3] // _BLOCK, image.shape[-2] // _BLOCK
+    assert rows * columns >= 2, f"{image.shape} has not two blocks of {_BLOCK}"
     return jnp.vectorize(partial(_of_one, params), signature="(h,w,c)->()")(image)
 
 
 def _of_one(params: Mapping[str, jax.Array], image: jax.Array) -> jax.Array:
-    height, width = (size // BLOCK * BLOCK for size in image.shape[:2])
-    luma = jnp.matmul(image[:height, :width], jnp.array(LUMA), precision=jax.lax.Precision.HIGHEST)
-    plane = jnp.round(luma + BLACK)  # the authors' code takes 8-bit pictures
-    coarse = halved(plane, CUBIC, beyond="symmetric")
-    features = jnp.concatenate([_block_features(plane, BLOCK), _block_features(coarse, BLOCK // 2)], axis=1)
+    height, width = (size // _BLOCK * _BLOCK for size in image.shape[:2])
+    luma = jnp.matmul(image[:height, :width], jnp.array(_LUMA), precision=jax.lax.Precision.HIGHEST)
+    plane = jnp.round(luma + _BLACK)  # the authors' code takes 8-bit pictures
+    coarse = halved(plane, _CUBIC, beyond="symmetric")
+    features = jnp.concatenate([_block_features(plane, _BLOCK), _block_features(coarse, _BLOCK // 2)], axis=1)
     return _distance(params, features)
 
 
@@ -74,5 +75,5 @@ def _block_features(plane: jax.Array, size: int) -> jax.Array:
 
 def _moments(block: jax.Array) -> Moments:
     """Of the block and of its product with each neighbour (5,), wrapping at its edges as the authors' code does."""
-    products = [block * jnp.roll(block, shift, axis=(0, 1)) for shift in NEIGHBOURS]
+    products = [block * jnp.roll(block, shift, axis=(0, 1)) for shift in _NEIGHBOURS]
     return jax.vmap(partial(moments, zero_is_right=False))(jnp.stack([block, *products]))

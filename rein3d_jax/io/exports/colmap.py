@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from rein3d_jax.io.exports.point_cloud import Points
-from rein3d_jax.io.exports.posed_picture import PosedPicture, write_picture
+from rein3d_jax.io.exports.posed_picture import PosedPicture, write_posed_picture
 from rein3d_jax.io.files.atomic import write_text
 
 _MOST_SEEN = 500  # points an image is said to see: tracks are for a look at the model, not for bundle adjustment
@@ -53,7 +53,7 @@ def quaternion(rotation: np.ndarray) -> np.ndarray:
 
 
 def _image(folder: Path, picture: PosedPicture, points: Points) -> _Image:
-    camera, name = picture.camera, write_picture(folder, picture, ".png.png")
+    camera, name = picture.camera, write_posed_picture(folder, picture, ".png.png")
     numbers = [*np.asarray(camera.focal, np.float64), *np.asarray(camera.centre, np.float64)]
     line = f"PINHOLE {camera.width} {camera.height} {' '.join(map(repr, map(float, numbers)))}"
     return _Image(name, np.linalg.inv(picture.pose), line, *_seen(picture, points.places))

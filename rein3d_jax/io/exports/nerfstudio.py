@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from rein3d_jax.io.exports.point_cloud import Points, write_points
-from rein3d_jax.io.exports.posed_picture import IMAGES, MASKS, PosedPicture, write_picture
+from rein3d_jax.io.exports.posed_picture import IMAGES, MASKS, PosedPicture, write_posed_picture
 from rein3d_jax.io.files.atomic import write_text
 
 _OPENCV_FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -28,7 +28,7 @@ def write_nerfstudio(folder: Path, pictures: Iterable[PosedPicture], points: Poi
 
 
 def _frame(folder: Path, picture: PosedPicture) -> dict:
-    name, camera = write_picture(folder, picture, ".png"), picture.camera
+    name, camera = write_posed_picture(folder, picture, ".png"), picture.camera
     (fl_x, fl_y), (cx, cy) = (np.asarray(pair, np.float64).tolist() for pair in (camera.focal, camera.centre))
     return {
         "file_path": f"{IMAGES}/{name}", "mask_path": f"{MASKS}/{name}",

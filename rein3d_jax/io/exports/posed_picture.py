@@ -28,7 +28,7 @@ class PosedPicture:
         return np.asarray(self.camera.world_from_camera, np.float64)
 
 
-def write_picture(folder: Path, picture: PosedPicture, mask_suffix: str) -> str:
+def write_posed_picture(folder: Path, picture: PosedPicture, mask_suffix: str) -> str:
     """Writes images/NAME.png and masks/NAME`mask_suffix` (white: use, black: leave out); returns NAME.png."""
     name = f"{picture.name}.png"
     white = np.repeat(picture.known[..., None], 3, axis=-1).astype(np.float32)
