@@ -50,20 +50,24 @@ class Point:
 
 def chart(files: list[Path], picture: Path, points: Path | None = None) -> None:
     """Draws the result files into `picture`, PNG, and writes what it shows into `points`, JSON. Raises InputError
-    without matplotlib, for files of different rooms, and for one that is no result of evaluate."""
-    results = {path: _result(path) for path in files}
-    rooms = {tuple(result["rooms"]) for result in results.values()}
-    if len(rooms) > 1:
-        raise InputError(f"--chart: {', '.join(map(str, files))} are of different rooms: evaluate all on the same")
-    panels = [(panel, _points(panel, results)) for panel in PANELS]
-    panels = [(panel, shown) for panel, shown in panels if shown]
-    if not panels:
-        raise InputError(f"--chart: {', '.join(map(str, files))} hold no figures to draw: evaluate novel-views first")
-    drawn = _png(panels, len(next(iter(rooms))))
-    write_bytes(picture, drawn)
+    without matplotlib, and as chart_points does."""
+    rooms, panels = chart_points(files)
+    write_bytes(picture, _png(panels, len(rooms)))
     if points is not None:
         table = [{**asdict(panel), "points": [asdict(point) for point in shown]} for panel, shown in panels]
-        write_text(points, json.dumps({"rooms": rooms.pop(), "panels": table}, indent=1) + "\n")
+        write_text(points, json.dumps({"rooms": rooms, "panels": table}, indent=1) + "\n")
+
+
+def chart_points(files: list[Path]) -> tuple[list[str], list[tuple[Panel, list[Point]]]]:
+    """The rooms of the result files, and the panels that they have figures for. Raises InputError for files of
+    different rooms, for one that is no result of evaluate, and where there is nothing to draw."""
+    results = [_result(path) for path in files]
+    if any(result["rooms"] != results[0]["rooms"] for result in results):
+        raise InputError(f"--chart: {', '.join(map(str, files))} are of different rooms: evaluate all on the same")
+    panels = [(panel, shown) for panel in PANELS if (shown := _points(panel, results))]
+    if not panels:
+        raise InputError(f"--chart: {', '.join(map(str, files))} hold no figures to draw: evaluate novel-views first")
+    return results[0]["rooms"], panels
 
 
 def _result(path: Path) -> dict:
@@ -73,10 +77,10 @@ def _result(path: Path) -> dict:
     return result
 
 
-def _points(panel: Panel, results: dict[Path, dict]) -> list[Point]:
-    several = len({result["recipe"] for result in results.values()}) > 1
+def _points(panel: Panel, results: list[dict]) -> list[Point]:
+    several = len({result["recipe"] for result in results}) > 1
     points = {}
-    for result in results.values():
+    for result in results:
         for method, metrics in result.get(panel.protocol, {}).items():
             cost, merit = metrics.get(panel.cost), metrics.get(panel.merit)
             if cost and merit and cost["mean"] is not None and merit["mean"] is not None:

@@ -1,17 +1,20 @@
 """Figures of one room by hand; the Pareto front by its law; the chart from results."""
 
 import json
+from dataclasses import asdict
+from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from experiments.evaluate import __main__ as evaluate
-from experiments.evaluate.chart import spread_labels
+from experiments.evaluate.chart import chart_points, spread_labels
 from experiments.evaluate.measure import BEST_PSNR, distance_figures, picture_figures, sphere_figures
 from experiments.evaluate.pareto import pareto_front
 from rein3d_jax.io.weights.metric_weights import lpips_weights
 
+ROOT = Path(__file__).resolve().parents[3]
 METRES = np.array([0.2, 0.7, 2.5])
 
 
@@ -109,3 +112,14 @@ def test_a_chart_compares_the_same_rooms(tmp_path, capsys):
     assert evaluate.main(["--chart", *files]) == 2 and "different rooms" in capsys.readouterr().err
     (tmp_path / "no.json").write_text("[]")
     assert evaluate.main(["--chart", str(tmp_path / "no.json")]) == 2 and "no result" in capsys.readouterr().err
+
+
+def test_what_the_report_compares_with_is_the_committed_results():
+    """After new ones, in benchmarks/results: python -m experiments.evaluate
+    --chart evaluate.json evaluate_draft.json evaluate_quick.json --points ../../experiments/reconstruct/measured.json
+    """
+    results = ROOT / "benchmarks" / "results"
+    rooms, panels = chart_points([results / f"evaluate{name}.json" for name in ("", "_draft", "_quick")])
+    packaged = json.loads((ROOT / "experiments/reconstruct/measured.json").read_text())
+    table = [asdict(panel) | {"points": [asdict(point) for point in points]} for panel, points in panels]
+    assert packaged == {"rooms": rooms, "panels": table}

@@ -1,7 +1,6 @@
 """What the report of a run says: sliders, warnings in plain words, where it stands, whose pictures; all of it text."""
 
 import dataclasses
-import json
 import re
 from pathlib import Path
 
@@ -96,20 +95,12 @@ def test_a_run_stands_among_what_was_measured(run):
     assert own.merit is None and "no truth" in own.label
 
 
-def test_the_chart_is_the_committed_one():
-    """After a new one: cp benchmarks/results/evaluate.chart.json experiments/reconstruct/measured.json"""
-    shipped, committed = ROOT / "experiments/reconstruct/measured.json", ROOT / "benchmarks/results/evaluate.chart.json"
-    assert json.loads(shipped.read_text()) == json.loads(committed.read_text())
-
-
-def test_licences_of_samples_are_those_of_their_list():
-    listed = (SAMPLES / "SOURCES.md").read_text()
+def test_every_sample_has_a_credit():
     said = " ".join(sources("sample:room/input.png"))
     for name in ("Scopia", "BlendSwap-CC-BY", "KatorLegaz", "BlendSwap-CC-0", "CC-BY 3.0", "CC-BY 3.0 US", "CC0"):
-        assert name in said and name in listed
-    assert "CC0" in sources("sample:hotel_room.jpg")[0]
-    samples = {path.name for path in SAMPLES.iterdir() if path.suffix != ".md"}
-    assert all(len(sources(f"sample:{name}")) == 2 for name in samples)
+        assert name in said
+    samples = {path.name for path in SAMPLES.iterdir() if path.suffix not in (".md", ".toml")}
+    assert samples and all(sources(f"sample:{name}") for name in samples)
 
 
 def test_the_credit_of_ones_own_picture_is_shown(tmp_path):
