@@ -1,6 +1,6 @@
-"""Build a dataset of clean and degraded clips to train a restorer on (paper Sec. 3).
+"""Build a dataset of clean and degraded clips to train a restorer on (Rein3D, Sec. 3).
 
-    python -m experiments.build_dataset --config experiments/recipes/tiny_pairs.toml [--set key=value ...]
+    python -m experiments.build_dataset --config tiny_pairs [--set key=value ...]
         [--worker I/N | --ray N [--ray-address A] | --address HOST:PORT --processes N --process I] [--check]
 
 Writes ArrayRecord shards, a JSON beside each, config.toml and manifest.json. Run again after a kill it goes on;

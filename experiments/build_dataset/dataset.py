@@ -11,7 +11,7 @@ from typing import Any
 
 import jax
 
-from experiments.build_dataset.pair_scenes import SceneConfig, clip_walks
+from experiments.build_dataset.pair_scenes import SceneConfig, pair_sources
 from experiments.config import dump_config
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
@@ -19,28 +19,25 @@ from rein3d_jax.io.files.json_file import read_json
 from rein3d_jax.io.pairs.pair_shard import MANIFEST, SUFFIX, shard_fault, write_shard
 from rein3d_jax.pipeline.pairs import PairConfig
 from rein3d_jax.scene import Pair
+from rein3d_jax.settings import Settings, setting
 
-CONFIG = "config.toml"
+_CONFIG = "config.toml"
 
 
 @dataclasses.dataclass(frozen=True)
-class DatasetConfig:
-    """What the dataset holds, and where."""
+class DatasetConfig(Settings):
+    """A dataset of pairs of clips: what it holds, and where."""
 
-    output: str = "runs/pairs"
-    clips: int = 64
-    clips_per_shard: int = 8
-    seed: int = 0
+    output: str = setting("runs/pairs", "folder of the shards; all machines that build must share it")
+    clips: int = setting(64, "clips of the whole dataset", within="[1, inf)")
+    clips_per_shard: int = setting(8, "clips of a shard, the unit of work of a worker", within="[1, inf)")
+    seed: int = setting(0, "clip i is a function of it and i", within="[0, 4294967295]")
     scenes: SceneConfig = SceneConfig()
     pairs: PairConfig = PairConfig()
 
-    def __post_init__(self):
-        if self.clips < 1 or self.clips_per_shard < 1:
-            raise InputError("clips and clips_per_shard must be at least 1")
-
     @property
     def shards(self) -> int:
-        """How many there are; the last may be smaller."""
+        """Number of shards; the last may be smaller."""
         return -(-self.clips // self.clips_per_shard)
 
 
@@ -51,8 +48,9 @@ def build_part(config: DatasetConfig, worker: int = 0, workers: int = 1, say: Ca
     Raises InputError where the folder holds a dataset of another config, and where no clip could be made at all.
     """
     folder, text = Path(config.output), _identity(config)
-    _claim(folder / CONFIG, text)
-    digest, walks = hashlib.sha256(text.encode()).hexdigest(), clip_walks(config.scenes, config.pairs, config.clips)
+    _claim(folder / _CONFIG, text)
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    sources = pair_sources(config.scenes, config.pairs, config.clips)
     for number in range(worker, config.shards, workers):
         path, begun = shard_path(folder, number, config), time.perf_counter()
         described, fault = _described(path, digest), None
@@ -62,20 +60,20 @@ def build_part(config: DatasetConfig, worker: int = 0, workers: int = 1, say: Ca
         if fault:
             say(f"{fault}; it is built again")
         about: dict[str, Any] = {"config": digest, "redraws": 0, "left_out": []}
-        described = write_shard(path, _pairs(config, number, walks, about), about)
+        described = write_shard(path, _pairs(config, number, sources, about), about)
         spent = time.perf_counter() - begun
         left_out = f", {len(about['left_out'])} left out" if about["left_out"] else ""
         say(f"shard {number + 1}/{config.shards}: {described['clips']} clips in {spent:.1f} s{left_out}")
-    join(config, digest, say)
+    write_manifest(config, digest, say)
 
 
 def shard_path(folder: Path, number: int, config: DatasetConfig) -> Path:
-    """Of one shard's records."""
+    """Path of one shard's records."""
     return folder / f"pairs-{number:05d}-of-{config.shards:05d}{SUFFIX}"
 
 
-def join(config: DatasetConfig, digest: str, say: Callable[[str], None]) -> None:
-    """Writes the manifest if every shard is described; whoever is last does, and everyone would write the same."""
+def write_manifest(config: DatasetConfig, digest: str, say: Callable[[str], None]) -> None:
+    """Writes the manifest if every shard is described: the last worker does, and any would write the same."""
     folder, shards = Path(config.output), []
     for number in range(config.shards):
         path = shard_path(folder, number, config)
@@ -91,12 +89,12 @@ def join(config: DatasetConfig, digest: str, say: Callable[[str], None]) -> None
     say(f"{folder / MANIFEST}: {clips} clips in {config.shards} shards, {sum(s['bytes'] for s in shards) / 1e6:.1f} MB")
 
 
-def _pairs(config: DatasetConfig, number: int, walks: Callable, about: dict[str, Any]) -> Iterator[Pair]:
+def _pairs(config: DatasetConfig, number: int, sources: Callable, about: dict[str, Any]) -> Iterator[Pair]:
     first = number * config.clips_per_shard
     for index in range(first, min(first + config.clips_per_shard, config.clips)):
-        name, walk = walks(index)
+        name, draw = sources(index)
         try:
-            drawn = walk(jax.random.fold_in(jax.random.key(config.seed), index))
+            drawn = draw(jax.random.fold_in(jax.random.key(config.seed), index))
         except InputError as error:
             if config.scenes.folder is None:  # rooms are drawn until one will do: that none does is the config's fault
                 raise

@@ -29,23 +29,23 @@ def fake_pair(key) -> Pair:
     return Pair(video, video)
 
 
-def walks_of(fails=()):
+def sources_of(fails=()):
     """Clips by key, but for those in `fails`, whose scene has no path."""
 
     def clip(index):
-        def walk(key):
+        def draw(key):
             if index in fails:
                 raise InputError("the longest straight path through its origin has 0.00 m")
             return Drawn(fake_pair(key), np.float32(5), np.int32(2), np.zeros(4))
 
-        return f"scene {index}", walk
+        return f"scene {index}", draw
 
     return lambda scenes, pairs, clips: clip
 
 
 @pytest.fixture
 def config(tmp_path, monkeypatch):
-    monkeypatch.setattr(dataset, "clip_walks", walks_of())
+    monkeypatch.setattr(dataset, "pair_sources", sources_of())
     return DatasetConfig(output=str(tmp_path / "pairs"), clips=7, clips_per_shard=2)
 
 
@@ -94,17 +94,17 @@ def test_goes_on_after_any_interruption(config, tmp_path, monkeypatch):
         made = iter(range(survives))
 
         def clip(index, made=made):
-            def walk(key):
+            def draw(key):
                 if next(made, None) is None:
                     raise KeyboardInterrupt
-                return walks_of()(None, None, 7)(index)[1](key)
+                return sources_of()(None, None, 7)(index)[1](key)
 
-            return "scene", walk
+            return "scene", draw
 
-        monkeypatch.setattr(dataset, "clip_walks", lambda *_, clip=clip: clip)
+        monkeypatch.setattr(dataset, "pair_sources", lambda *_, clip=clip: clip)
         with pytest.raises(KeyboardInterrupt):
             build_part(killed, say=silent)
-    monkeypatch.setattr(dataset, "clip_walks", walks_of())
+    monkeypatch.setattr(dataset, "pair_sources", sources_of())
     assert build(killed) == one
 
 
@@ -128,13 +128,13 @@ def test_another_config_is_refused(config):
 
 
 def test_a_scene_without_a_path_is_left_out_and_named(config, tmp_path, monkeypatch):
-    monkeypatch.setattr(dataset, "clip_walks", walks_of(fails={2, 3, 6}))
+    monkeypatch.setattr(dataset, "pair_sources", sources_of(fails={2, 3, 6}))
     scenes = dataset.SceneConfig(folder="somewhere")
     build(config := at(config, tmp_path, "some", scenes=scenes))
     manifest = manifest_of(config)
     assert manifest["clips"] == len(PairDataset(config.output)) == 4 and manifest["left_out"] == 3
     assert "clip 3 in scene 3: the longest straight path" in manifest["shards"][1]["left_out"][1]
-    monkeypatch.setattr(dataset, "clip_walks", walks_of(fails=set(range(7))))
+    monkeypatch.setattr(dataset, "pair_sources", sources_of(fails=set(range(7))))
     with pytest.raises(InputError, match="no clip could be made: clip 0"):
         build(at(config, tmp_path, "none", scenes=scenes))
 
