@@ -18,8 +18,8 @@ from rein3d_jax.depth.complete import complete_distance
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.json_file import read_json
 from rein3d_jax.io.pictures.image import resize_panorama
+from rein3d_jax.io.pictures.panorama import read_panorama
 from rein3d_jax.io.rooms.panorama_sets import panorama_sets
-from rein3d_jax.io.rooms.posed_panorama import read_rgbd_panorama
 from rein3d_jax.io.rooms.traced_room import TracedRoom, read_traced_room
 from rein3d_jax.pipeline.pairs import PairConfig, degrade
 from rein3d_jax.pipeline.survey import lift_scene, room_background
@@ -98,7 +98,7 @@ class EvaluationRoom:
     @cached_property
     def given(self) -> Panorama:
         """The input as its files hold it."""
-        return read_rgbd_panorama(self.source.rgb, self.source.distance)
+        return read_panorama(self.source.rgb, distance=self.source.distance)
 
     @cached_property
     def panorama(self) -> Panorama:

@@ -1,4 +1,4 @@
-"""A finished run for other tools.
+"""A finished run as files for other tools: data sets, a mesh, panoramas, splat formats.
 
     python -m experiments.export runs/room --to nerfstudio colmap mesh panoramas spz [--output FOLDER]
 
@@ -21,9 +21,9 @@ from rein3d_jax.io.exports.colmap import write_colmap
 from rein3d_jax.io.exports.nerfstudio import write_nerfstudio
 from rein3d_jax.io.exports.point_cloud import points_of
 from rein3d_jax.io.meshes.surface_mesh import write_glb
-from rein3d_jax.io.splats.gaussian_file import write_gaussians
+from rein3d_jax.io.splats.gaussian_file import write_splats
 
-POINTS = 50_000  # that a data set starts from
+_POINTS = 50_000  # that a data set starts from
 SCENES = ("ply", "compressed.ply", "spz", "splat")
 
 
@@ -31,7 +31,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where the input is at fault."""
     parser = CommandParser("export", __doc__)
     parser.add_argument("run", metavar="RUN_FOLDER", help="what reconstruct wrote, with its stages folder")
-    kinds = [*KINDS, *SCENES]
+    kinds = [*_KINDS, *SCENES]
     parser.add_argument("--to", nargs="+", required=True, choices=kinds, metavar="KIND",
                         help=f"what to write, one or more of {', '.join(kinds)}")  # fmt: skip
     parser.add_argument("--output", metavar="FOLDER", help="where to write (default: RUN_FOLDER/export)")
@@ -45,16 +45,16 @@ def _export(options: argparse.Namespace) -> None:
     run = open_run(options.run)
     output = Path(options.output) if options.output else run.path / "export"
     for name in options.to:
-        print(KINDS[name](run, output, options) if name in KINDS else _scene(run, output, name))
+        print(_KINDS[name](run, output, options) if name in _KINDS else _scene(run, output, name))
 
 
 def _nerfstudio(run: RunFolder, output: Path, options) -> str:
-    count = write_nerfstudio(output / "nerfstudio", posed_pictures(run), points_of(run.refined, POINTS))
+    count = write_nerfstudio(output / "nerfstudio", posed_pictures(run), points_of(run.refined, _POINTS))
     return f"{output / 'nerfstudio'}: {count} pictures"
 
 
 def _colmap(run: RunFolder, output: Path, options) -> str:
-    count = write_colmap(output / "colmap", posed_pictures(run), points_of(run.refined, POINTS))
+    count = write_colmap(output / "colmap", posed_pictures(run), points_of(run.refined, _POINTS))
     return f"{output / 'colmap'}: {count} pictures"
 
 
@@ -71,11 +71,11 @@ def _panoramas(run: RunFolder, output: Path, options) -> str:
 
 def _scene(run: RunFolder, output: Path, suffix: str) -> str:
     path = output / f"scene.{suffix}"
-    write_gaussians(path, run.refined, antialias=run.config.rasterize.antialias)
+    write_splats(path, run.refined, antialias=run.config.rasterize.antialias)
     return f"{path}: {path.stat().st_size / 1e6:.1f} MB"
 
 
-KINDS: dict[str, Callable[..., str]] = {
+_KINDS: dict[str, Callable[..., str]] = {
     "nerfstudio": _nerfstudio,
     "colmap": _colmap,
     "mesh": _mesh,

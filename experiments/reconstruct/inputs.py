@@ -4,12 +4,9 @@ import dataclasses
 import hashlib
 from pathlib import Path
 
-import jax.numpy as jnp
-
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.input_file import require_file
-from rein3d_jax.io.pictures.distance import read_distance
-from rein3d_jax.io.pictures.image import read_rgb, resize_panorama
+from rein3d_jax.io.pictures.panorama import read_panorama
 from rein3d_jax.io.rooms import traced_room
 from rein3d_jax.io.rooms.traced_room import View
 from rein3d_jax.scene import Panorama
@@ -45,13 +42,8 @@ def input_panorama(config: InputConfig) -> Panorama:
     """The panorama at the working height; where no distance is given, none is valid."""
     path = resolve(config.panorama)
     require_file(path)
-    rgb = read_rgb(path)
-    if config.distance is None:
-        rgb, _, _ = resize_panorama(rgb, None, None, config.height)
-        unknown = jnp.zeros(rgb.shape[:2])
-        return Panorama(jnp.asarray(rgb), unknown, unknown > 0)
-    distance, valid = read_distance(resolve(config.distance), rgb.shape[:2])
-    return Panorama(*(jnp.asarray(x) for x in resize_panorama(rgb, distance, valid, config.height)))
+    distance = None if config.distance is None else resolve(config.distance)
+    return read_panorama(path, distance=distance, height=config.height)
 
 
 def input_views(config: InputConfig) -> list[View]:

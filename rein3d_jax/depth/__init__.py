@@ -7,3 +7,8 @@
 
 Distances are metres along the ray. An estimate never becomes "known" here: validity is a mask the caller keeps.
 """
+
+from rein3d_jax.depth.complete import CompleteConfig, complete_distance
+from rein3d_jax.depth.room_shell import RoomShellConfig, fit_room_shell, shell_distance
+
+__all__ = ["CompleteConfig", "RoomShellConfig", "complete_distance", "fit_room_shell", "shell_distance"]

@@ -19,7 +19,7 @@ from rein3d_jax.geometry.sphere import world_from_camera_axes
 from rein3d_jax.lift import LiftConfig, lift
 from rein3d_jax.rasterize import RasterizeConfig, enlarge, rasterize
 from rein3d_jax.rooms.config import RoomConfig
-from rein3d_jax.rooms.generate import room
+from rein3d_jax.rooms.generate import generate_room
 from rein3d_jax.rooms.tracing.trace import trace
 from rein3d_jax.scene import Pair, Panorama, Video
 
@@ -87,7 +87,7 @@ def room_pair(key: jax.Array, config: PairConfig) -> Drawn:
     def draw(state):
         """The next room, and its longest path."""
         draws, _, _ = state
-        place = room(jax.random.fold_in(draw_key, draws), config.rooms)
+        place = generate_room(jax.random.fold_in(draw_key, draws), config.rooms)
         distance = trace(place, _pose(jnp.zeros(3)), SCOUT).distance
         return draws + 1, place, longest_chord(distance, distance > 0, config=config.explore)
 
@@ -201,7 +201,7 @@ def _pose(position: jax.Array) -> jax.Array:
 def with_buffers(config: PairConfig) -> PairConfig:
     """The config with rasterizer buffers that most clips fit: a function of the config alone, since sums over buffers
     of other sizes round otherwise, and a clip's bytes may not depend on those before it."""
-    splats = 2 * (config.source_rows // config.lift.stride) ** 2
+    splats = 2 * config.source_rows**2
     tiles = 2 * (config.height // config.rasterize.tile) ** 2
     pairs = 3 * splats + 90 * tiles  # measured at 128 and 256 source rows: 2.7 splats + 82 tiles
     sizes = (splats, 3 * splats // 2 + 20 * tiles, pairs, pairs // config.rasterize.chunk + tiles)

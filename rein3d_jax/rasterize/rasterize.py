@@ -111,7 +111,9 @@ def enlarge(config: RasterizeConfig, *needed: int) -> RasterizeConfig:
     )
 
 
-def render(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig) -> tuple[Frame, RasterizeConfig]:
+def render(
+    gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig = RasterizeConfig()
+) -> tuple[Frame, RasterizeConfig]:
     """`rasterize` that allocates, and allocates again on overflow. Returns the config to reuse."""
     if min(config.buffers) == 0:
         config = allocate(gaussians, [camera], config=config)

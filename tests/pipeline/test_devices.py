@@ -33,7 +33,7 @@ def test_a_batch_that_cannot_be_shared_is_refused():
         batch = 4
 
     with pytest.raises(InputError, match=r"refine.batch 4 is not divided by 3 devices"):
-        steps_over(Three())(None, None, [], [], 1.0, None, config=Config(), raster=None)
+        steps_over(Three())(None, None, [], None, config=Config(), raster=None)
     assert data_mesh(1).size == 1
 
 
@@ -45,19 +45,19 @@ def on_four_devices():
     import numpy as np
 
     from rein3d_jax.refine.state import initial_state
-    from rein3d_jax.refine.step import steps
+    from rein3d_jax.refine.step import Chance, take_step
 
     spec = importlib.util.spec_from_file_location("toy", ROOT / "tests" / "refine" / "conftest.py")
     toy = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(toy)
     assert jax.device_count() == DEVICES
-    config = dataclasses.replace(toy.CONFIG, batch=DEVICES, colour_rate=1e-3)
+    config = dataclasses.replace(toy.CONFIG, batch=DEVICES)
     views, start = toy.make_views(), toy.blurred(toy.make_scene())
-    batches, backdrops = np.array([[1, 2, 3, 5]]), jax.numpy.array([[0.2, 0.6, 0.9]])
-    arguments = (views, batches, backdrops, 2.0, jax.random.key(0))
+    chance = Chance(jax.numpy.array([0.2, 0.6, 0.9]), jax.random.key(0))
+    arguments = (views, np.array([1, 2, 3, 5]), chance)
     found = []
-    for run in (steps, steps_over(data_mesh())):
-        state = initial_state(start, config, sources=3)
+    for run in (take_step, steps_over(data_mesh())):
+        state = initial_state(start, config, extent=2.0)
         found.append(run(state, *arguments, config=config, raster=toy.RASTER))
     (alone, of_one), (shared, of_four) = found
     np.testing.assert_allclose(of_four["loss"], of_one["loss"], rtol=1e-5)  # float32 sums in another order
@@ -67,10 +67,10 @@ def on_four_devices():
         one, four = (np.asarray(s.optimizer.inner_states[name].inner_state[0].mu[name]) for s in (alone, shared))
         np.testing.assert_allclose(four, one, atol=1e-4 * np.abs(one).max(initial=0), err_msg=name)  # float32 sums
     tight = dataclasses.replace(toy.RASTER, pair_capacity=16)
-    _, cut = steps_over(data_mesh())(initial_state(start, config, sources=3), *arguments, config=config, raster=tight)
-    _, whole = steps(initial_state(start, config, sources=3), *arguments, config=config, raster=tight)
-    assert int(cut["overflow"][0]) == int(whole["overflow"][0]) > 0
-    assert np.all(np.asarray(cut["needed"][0])[2] >= np.asarray(whole["needed"][0])[2])  # no less than any needs
+    _, cut = steps_over(data_mesh())(initial_state(start, config, extent=2.0), *arguments, config=config, raster=tight)
+    _, whole = take_step(initial_state(start, config, extent=2.0), *arguments, config=config, raster=tight)
+    assert int(cut["overflow"]) == int(whole["overflow"]) > 0
+    assert np.all(np.asarray(cut["needed"])[2] >= np.asarray(whole["needed"])[2])  # no less than any needs
 
 
 if __name__ == "__main__":

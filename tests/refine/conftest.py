@@ -11,15 +11,17 @@ import pytest
 from rein3d_jax.geometry.pinhole import focal_from_fov
 from rein3d_jax.geometry.poses import pinhole_camera, upright
 from rein3d_jax.rasterize import RasterizeConfig, rasterize
-from rein3d_jax.refine import RefineConfig, Views
+from rein3d_jax.refine import DensifyConfig, RefineConfig, Views, ViewsConfig, first_snapshot, refine
 from rein3d_jax.scene import Gaussians
 
-COUNT, SPARE, SIZE, VIEWS, SOURCES = 40, 20, 16, 12, 3
+COUNT, SPARE, SIZE, VIEWS = 40, 20, 16, 12
+EXTENT = 2.0  # metres
 # Roomier than `refine` would ask for, so that it keeps these buffers and the tests share one compiled step.
 RASTER = RasterizeConfig(visible_capacity=96, row_capacity=256, pair_capacity=512, chunk_capacity=128)
 CONFIG = RefineConfig(
-    steps=10, batch=2, crop=SIZE, test_every=4, evaluate_every=5, sh_degree=1, sh_degree_every=4, finest=0.0,
-    densify_start=4, densify_every=4, densify_share=1.0, reset_every=100,
+    steps=10, batch=2, evaluate_every=5, sh_degree=1, sh_degree_every=4, min_scale=0.0,
+    views=ViewsConfig(size=SIZE, held_out_every=4),
+    densify=DensifyConfig(start=4, every=4, share=1.0, reset_every=100),
 )  # fmt: skip
 
 
@@ -45,8 +47,7 @@ def make_views(scale: float = 1.0) -> Views:
     rgb = jnp.stack([rasterize(make_scene(scale), camera, config=RASTER).rgb for camera in cameras])
     poses = jnp.stack([camera.world_from_camera for camera in cameras])
     focal = jnp.full(VIEWS, focal_from_fov(np.pi / 2, SIZE), jnp.float32)
-    ones = jnp.ones((VIEWS, SIZE, SIZE))
-    return Views(rgb, ones, jnp.zeros_like(ones), poses, focal, jnp.arange(VIEWS, dtype=jnp.int32) % SOURCES)
+    return Views(rgb, jnp.ones((VIEWS, SIZE, SIZE)), poses, focal)
 
 
 def blurred(scene: Gaussians) -> Gaussians:
@@ -59,6 +60,17 @@ def blurred(scene: Gaussians) -> Gaussians:
 def toy() -> Callable:
     """scale -> (the scene, its views, a wrong start)."""
     return functools.cache(lambda scale=1.0: (make_scene(scale), make_views(scale), blurred(make_scene(scale))))
+
+
+@pytest.fixture(scope="session")
+def fit() -> Callable:
+    """(a start, views, config) -> all snapshots of its refinement, with the shared key and buffers."""
+
+    def snapshots(start, views, config, fixed=None):
+        first = first_snapshot(start, views, extent=EXTENT, config=config, raster=RASTER, fixed=fixed)
+        return list(refine(first, views, jax.random.key(0), config=config, raster=RASTER))
+
+    return snapshots
 
 
 @pytest.fixture

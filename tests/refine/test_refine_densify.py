@@ -9,13 +9,12 @@ import numpy as np
 from rein3d_jax.refine.densify import RESET_OPACITY, SHRINK, densify, reset_opacity
 from rein3d_jax.refine.state import RefineState, initial_state
 
-EXTENT = 2.0
 KEY = jax.random.key(0)
 
 
 def state_of(toy, config) -> RefineState:
     """Every slot remembers something, and Gaussians 0, 3, 6, ... want to grow, the first ones most."""
-    state = initial_state(toy()[2], config)
+    state = initial_state(toy()[2], config, extent=2.0)
     count = state.alive.shape[0]
     moments = jax.tree.map(lambda x: jnp.ones_like(x) if x.ndim and x.shape[0] == count else x, state.optimizer)
     pull = jnp.where(jnp.arange(count) % 3 == 0, 1.0 - jnp.arange(count) / 1000, 0.0)
@@ -33,9 +32,9 @@ def remembers(state) -> np.ndarray:
     return np.any([np.asarray(x).reshape(count, -1).any(axis=1) for x in leaves], axis=0)
 
 
-def test_dead_slots_are_used_and_the_count_is_kept(toy, config) -> None:
+def test_dead_slots_are_used_and_the_count_adds_up(toy, config) -> None:
     before = state_of(toy, config)
-    after, counts = densify(before, EXTENT, KEY, config=config)
+    after, counts = densify(before, KEY, config=config.densify)
     added, pruned, overflow = (int(counts[name]) for name in ("added", "pruned", "overflow"))
     assert int(after.alive.sum()) == int(before.alive.sum()) + added - pruned
     assert added == wanted(before).sum() and overflow == 0 and pruned == 0
@@ -47,7 +46,7 @@ def test_dead_slots_are_used_and_the_count_is_kept(toy, config) -> None:
 def test_without_a_free_slot_growth_is_counted_as_overflow(toy, config) -> None:
     before = state_of(toy, config)
     before = before.replace(alive=jnp.ones_like(before.alive))
-    after, counts = densify(before, EXTENT, KEY, config=config)
+    after, counts = densify(before, KEY, config=config.densify)
     assert int(counts["added"]) == 0 and int(counts["overflow"]) == wanted(before).sum()
     for name, value in before.parameters.items():
         np.testing.assert_array_equal(after.parameters[name], value)  # and nobody was split in place
@@ -55,7 +54,7 @@ def test_without_a_free_slot_growth_is_counted_as_overflow(toy, config) -> None:
 
 def test_a_split_keeps_its_place_and_shrinks(toy, config) -> None:
     before = state_of(toy, config)
-    after, counts = densify(before, EXTENT, KEY, config=dataclasses.replace(config, split_size=1e-6))
+    after, counts = densify(before, KEY, config=dataclasses.replace(config.densify, split_size=1e-6))
     parents, children = np.flatnonzero(wanted(before)), np.flatnonzero(np.asarray(after.alive & ~before.alive))
     assert len(children) == len(parents) == int(counts["added"])
     old, new = before.parameters, after.parameters
@@ -74,7 +73,7 @@ def test_a_split_keeps_its_place_and_shrinks(toy, config) -> None:
 
 def test_a_clone_copies_and_its_original_remembers(toy, config) -> None:
     before = state_of(toy, config)
-    after, _ = densify(before, EXTENT, KEY, config=dataclasses.replace(config, split_size=100.0))
+    after, _ = densify(before, KEY, config=dataclasses.replace(config.densify, split_size=100.0))
     parents, children = np.flatnonzero(wanted(before)), np.flatnonzero(np.asarray(after.alive & ~before.alive))
     for name, value in before.parameters.items():
         np.testing.assert_array_equal(after.parameters[name][parents], value[parents])
@@ -86,7 +85,7 @@ def test_the_faint_are_pruned_and_forgotten(toy, config) -> None:
     before = state_of(toy, config)
     logits = before.parameters["opacity_logits"].at[1].set(-10.0)  # opacity 5e-5
     before = before.replace(parameters=before.parameters | {"opacity_logits": logits})
-    after, counts = densify(before, EXTENT, KEY, config=config)
+    after, counts = densify(before, KEY, config=config.densify)
     assert int(counts["pruned"]) == 1 and not after.alive[1] and not remembers(after)[1]
 
 
@@ -95,7 +94,7 @@ def test_a_reset_caps_opacity_and_forgets_only_its_moments(toy, config) -> None:
     after = reset_opacity(before)
     opacity = jax.nn.sigmoid(after.parameters["opacity_logits"])
     assert np.all(opacity <= RESET_OPACITY * (1 + 1e-5))  # float32
-    assert np.all(opacity > config.prune_opacity)  # a reset alone prunes nothing
+    assert np.all(opacity > config.densify.prune_opacity)  # a reset alone prunes nothing
     assert not any(np.any(x) for x in jax.tree.leaves(after.optimizer.inner_states["opacity_logits"]) if x.ndim)
     for name in ("means", "sh"):
         np.testing.assert_array_equal(after.parameters[name], before.parameters[name])

@@ -1,14 +1,10 @@
 """Panoramas with the place they were taken from, as every data set is handed on; and the poses of such cameras."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
-import jax.numpy as jnp
 import numpy as np
 
 from rein3d_jax.geometry.sphere import WORLD_FROM_CAMERA_AXES
-from rein3d_jax.io.pictures.distance import read_distance
-from rein3d_jax.io.pictures.image import read_rgb, resize_panorama
 from rein3d_jax.scene import Panorama
 
 _RIGID = 1e-3  # matrices come from text of a few digits
@@ -21,16 +17,6 @@ class PosedPanorama:
     name: str
     panorama: Panorama
     world_from_camera: np.ndarray  # (4, 4) float64, OpenCV camera axes
-
-
-def read_rgbd_panorama(rgb: Path, distance: Path, height: int | None = None) -> Panorama:
-    """The panorama of the pictures at `rgb` and `distance`, brought to `height` rows if that is given. Raises
-    InputError for whatever `read_rgb` and `read_distance` refuse, another size among it."""
-    picture = read_rgb(rgb)
-    metres, valid = read_distance(distance, picture.shape[:2])
-    if height is not None:
-        picture, metres, valid = resize_panorama(picture, metres, valid, height)
-    return Panorama(*map(jnp.asarray, (picture, metres, valid)))
 
 
 def panorama_pose(rotation: np.ndarray, position: np.ndarray) -> np.ndarray:

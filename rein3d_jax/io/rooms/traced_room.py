@@ -20,7 +20,8 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.json_file import path_within, read_json
 from rein3d_jax.io.pictures.decode import open_image
 from rein3d_jax.io.pictures.image import read_rgb
-from rein3d_jax.io.rooms.posed_panorama import PosedPanorama, panorama_pose, read_rgbd_panorama, rigid_pose
+from rein3d_jax.io.pictures.panorama import read_panorama
+from rein3d_jax.io.rooms.posed_panorama import PosedPanorama, panorama_pose, rigid_pose
 from rein3d_jax.scene import Camera
 
 
@@ -34,7 +35,7 @@ class View:
 
 
 @dataclass(frozen=True)
-class Frame:
+class VideoFrame:
     """A panorama of a film through the room."""
 
     name: str
@@ -49,7 +50,7 @@ class TracedRoom:
     input: PosedPanorama
     views: tuple[View, ...]
     panos: tuple[PosedPanorama, ...]
-    video: tuple[Frame, ...]  # all of one size
+    video: tuple[VideoFrame, ...]  # all of one size
 
 
 def read_traced_room(path: str | Path) -> TracedRoom:
@@ -106,14 +107,14 @@ def _view(path: Path, entry: dict[str, Any], anywhere: bool) -> View:
 def _pano(path: Path, entry: dict[str, Any]) -> PosedPanorama:
     pose = _pano_pose(entry["c2w"])
     rgb, distance = (path_within(path.parent, entry[name], named_by=path) for name in ("rgb", "distance"))
-    return PosedPanorama(entry["rgb"], read_rgbd_panorama(rgb, distance), pose)
+    return PosedPanorama(entry["rgb"], read_panorama(rgb, distance=distance), pose)
 
 
-def _frame(path: Path, entry: dict[str, Any], size: tuple[int, int]) -> Frame:
+def _frame(path: Path, entry: dict[str, Any], size: tuple[int, int]) -> VideoFrame:
     pose = _pano_pose(entry["c2w"])
     file = path_within(path.parent, entry["rgb"], named_by=path)
     _check_size(file, _size(file), size, path)
-    return Frame(entry["rgb"], read_rgb(file), pose)
+    return VideoFrame(entry["rgb"], read_rgb(file), pose)
 
 
 def _pano_pose(c2w: object) -> np.ndarray:

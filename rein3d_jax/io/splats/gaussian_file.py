@@ -24,13 +24,13 @@ _FORMATS: dict[str, tuple[Callable[..., Gaussians], Callable[..., None]]] = {
 }
 
 
-def read_gaussians(path: str | Path) -> Gaussians:
+def read_splats(path: str | Path) -> Gaussians:
     """The scene in `path`, every slot alive, in the axes of io/ply.py. Raises InputError for a suffix that is none of
     these, and for what the format's reader refuses."""
     return _format(path)[0](path)
 
 
-def write_gaussians(path: str | Path, gaussians: Gaussians, *, antialias: bool = False) -> None:
+def write_splats(path: str | Path, gaussians: Gaussians, *, antialias: bool = False) -> None:
     """Writes the alive slots to `path`, atomically; what a format cannot hold is in its module. `antialias` is
     write_ply's; .compressed.ply and .splat have no place for it. Raises InputError."""
     write = _format(path)[1]

@@ -30,7 +30,7 @@ def read_restorer(path: str | Path = SHIPPED_RESTORER) -> tuple[dict, dict[str, 
     if not path.exists():
         raise InputError(
             f"{path} is missing: give restore.weights the weights.npz of a training run "
-            "(python -m experiments.train_restore), or set restore.method = \"background\""
+            '(python -m experiments.train_restore), or set restore.method = "background"'
         )
     names = list(read_headers(path))
     arrays = dict(zip(names, read_arrays(path, names), strict=True))

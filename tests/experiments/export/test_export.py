@@ -18,7 +18,7 @@ from rein3d_jax.geometry.sphere import rays_of_pose64
 from rein3d_jax.io.meshes.surface_mesh import surface, without_islands, write_glb
 from rein3d_jax.io.pictures.distance import read_distance
 from rein3d_jax.io.pictures.image import read_rgb
-from rein3d_jax.io.splats.gaussian_file import read_gaussians
+from rein3d_jax.io.splats.gaussian_file import read_splats
 
 VOXEL = 0.06
 
@@ -90,9 +90,9 @@ def test_the_mesh_of_a_scene_is_near_the_room(run_folder, room):
 
 
 def test_a_grid_that_is_too_fine_is_refused(run_folder):
-    with pytest.raises(InputError, match=r"--voxel 0.001 asks for .* raise it"):
+    with pytest.raises(InputError, match=r"voxel 0.001 asks for .* raise it"):
         room_field(open_run(run_folder).refined, 0.001)
-    with pytest.raises(InputError, match="--voxel must lie"):
+    with pytest.raises(InputError, match=r"voxel must be in \[0.001, 1\], not nan"):
         MeshConfig(voxel=float("nan"))
 
 
@@ -110,7 +110,7 @@ def test_panoramas_come_back(run_folder, tmp_path):
 @pytest.mark.parametrize("suffix", export.SCENES)
 def test_scenes_in_any_format(run_folder, tmp_path, suffix):
     exported(run_folder, tmp_path, suffix)
-    found, wanted = read_gaussians(tmp_path / f"scene.{suffix}"), open_run(run_folder).refined
+    found, wanted = read_splats(tmp_path / f"scene.{suffix}"), open_run(run_folder).refined
     assert len(found.means) == len(wanted.means)
     low, high = (np.quantile(wanted.means, q, axis=0) for q in (0.1, 0.9))
     np.testing.assert_allclose(np.quantile(found.means, 0.1, axis=0), low, atol=0.01)
@@ -131,7 +131,7 @@ def test_faults_are_one_line(run_folder, tmp_path, capsys, monkeypatch):
     refused(capsys, [str(tmp_path), "--to", "spz"], "scene.ply")
     (tmp_path / "scene.ply").write_bytes((run_folder / "scene.ply").read_bytes())
     refused(capsys, [str(tmp_path), "--to", "nerfstudio"], "read.npz")
-    refused(capsys, [str(run_folder), "--to", "mesh", "--voxel", "9"], "--voxel")
+    refused(capsys, [str(run_folder), "--to", "mesh", "--voxel", "9"], "voxel must be in [0.001, 1], not 9.0")
     (tmp_path / "file").write_text("")
     refused(capsys, [str(run_folder), "--to", "spz", "--output", str(tmp_path / "file")], "cannot be written")
     monkeypatch.setitem(sys.modules, "skimage.measure", None)

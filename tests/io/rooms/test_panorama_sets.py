@@ -7,8 +7,8 @@ import pytest
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.pictures.distance import write_distance_exr
 from rein3d_jax.io.pictures.image import write_rgb
+from rein3d_jax.io.pictures.panorama import read_panorama
 from rein3d_jax.io.rooms.panorama_sets import panorama_sets
-from rein3d_jax.io.rooms.posed_panorama import read_rgbd_panorama
 
 SHAPE = (16, 32)
 RNG = np.random.default_rng(0)
@@ -32,7 +32,7 @@ def test_structured3d_is_read_in_order(tmp_path):
     found = panorama_sets(tmp_path)
     assert [files.name for files in found] == ["scene_00002/12", "scene_00002/9", "scene_00010/7"]
     assert panorama_sets(tmp_path / "scene_00010") == found[2:]
-    panorama = read_rgbd_panorama(found[0].rgb, found[0].distance)
+    panorama = read_panorama(found[0].rgb, distance=found[0].distance)
     np.testing.assert_allclose(panorama.distance, DISTANCE, rtol=1e-6)  # float32
     np.testing.assert_array_equal(panorama.valid, MILLIMETRES > 0)
     np.testing.assert_allclose(panorama.rgb, PICTURE, atol=0.5 / 255 + 1e-6)  # 8 bits
@@ -52,7 +52,7 @@ def test_a_folder_of_every_format(tmp_path):
     found = panorama_sets(tmp_path)
     assert [files.name for files in found] == ["a", "b", "c"]
     for files in found:
-        distance = read_rgbd_panorama(files.rgb, files.distance).distance
+        distance = read_panorama(files.rgb, distance=files.distance).distance
         np.testing.assert_allclose(distance, DISTANCE, rtol=1e-6)  # float32
 
 
@@ -77,4 +77,4 @@ def test_files_that_do_not_fit_each_other(tmp_path):
     write_folder(tmp_path)
     np.save(tmp_path / "c_distance.npy", DISTANCE[:8])
     with pytest.raises(InputError, match=r"c_distance.npy has 8 x 32 values"):
-        read_rgbd_panorama(*panorama_sets(tmp_path)[2][1:])
+        read_panorama(panorama_sets(tmp_path)[2].rgb, distance=panorama_sets(tmp_path)[2].distance)

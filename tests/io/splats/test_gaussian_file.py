@@ -23,7 +23,7 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.spherical_harmonics import basis
 from rein3d_jax.io.splats import spz
 from rein3d_jax.io.splats.gaussian_columns import alive_columns
-from rein3d_jax.io.splats.gaussian_file import read_gaussians, write_gaussians
+from rein3d_jax.io.splats.gaussian_file import read_splats, write_splats
 from rein3d_jax.scene import Gaussians
 
 PEER = Path(__file__).parent / "splat_transform"
@@ -94,8 +94,8 @@ def test_round_trip_within_the_steps_of_the_format(tmp_path, suffix, degree):
     if suffix == "splat":
         degree = 0
     path = tmp_path / f"x.{suffix}"
-    write_gaussians(path, wanted)
-    got = read_gaussians(path)
+    write_splats(path, wanted)
+    got = read_splats(path)
     assert got.alive.all() and got.means.shape == (N - 2, 3) and got.sh.shape == (N - 2, (degree + 1) ** 2, 3)
     close(got, wanted, BOUNDS[suffix])
 
@@ -103,9 +103,9 @@ def test_round_trip_within_the_steps_of_the_format(tmp_path, suffix, degree):
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_the_antialias_flag_changes_nothing_else(tmp_path, suffix):
     plain, flagged = tmp_path / f"a.{suffix}", tmp_path / f"b.{suffix}"
-    write_gaussians(plain, scene(1))
-    write_gaussians(flagged, scene(1), antialias=True)
-    for a, b in zip(*(jax.tree.leaves(read_gaussians(path)) for path in (plain, flagged)), strict=True):
+    write_splats(plain, scene(1))
+    write_splats(flagged, scene(1), antialias=True)
+    for a, b in zip(*(jax.tree.leaves(read_splats(path)) for path in (plain, flagged)), strict=True):
         np.testing.assert_array_equal(a, b)
     if suffix == "ply":
         assert plyfile.PlyData.read(flagged).comments == ["antialiased (Mip-Splatting, eq. 9)"]
@@ -131,13 +131,13 @@ def close(got, wanted, bounds):
 @pytest.mark.parametrize("suffix", SUFFIXES[1:])
 def test_splat_transform_reads_ours_as_we_do(tmp_path, suffix):
     """Its readings are stored; that we still write the same is the first line."""
-    wanted = read_gaussians(PEER / "scene.ply")
-    write_gaussians(tmp_path / f"x.{suffix}", wanted)
+    wanted = read_splats(PEER / "scene.ply")
+    write_splats(tmp_path / f"x.{suffix}", wanted)
     ours = (tmp_path / f"x.{suffix}").read_bytes(), (PEER / f"ours.{suffix}").read_bytes()
     assert len({gzip.decompress(data) if suffix == "spz" else data for data in ours}) == 1
-    theirs = read_gaussians(PEER / f"ours.{suffix}.read.ply")
+    theirs = read_splats(PEER / f"ours.{suffix}.read.ply")
     close(
-        read_gaussians(PEER / f"ours.{suffix}"), theirs, (0, 0, 0.02, 1e-6, 1e-6)
+        read_splats(PEER / f"ours.{suffix}"), theirs, (0, 0, 0.02, 1e-6, 1e-6)
     )  # .splat: they centre a byte at 127.5
     close(theirs, wanted, BOUNDS[suffix])
 
@@ -146,7 +146,7 @@ def test_splat_transform_reads_ours_as_we_do(tmp_path, suffix):
 def test_we_read_what_splat_transform_writes(name):
     place, scale, turn, colour, rest = BOUNDS[name.removeprefix("theirs.")]
     bounds = (place, scale, turn, colour, rest + 1 / 128)  # it rounds SH to 1/128 first
-    close(read_gaussians(PEER / name), read_gaussians(PEER / "scene.ply"), bounds)
+    close(read_splats(PEER / name), read_splats(PEER / "scene.ply"), bounds)
 
 
 @pytest.mark.skipif(
@@ -155,13 +155,13 @@ def test_we_read_what_splat_transform_writes(name):
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_splat_transform_reads_a_larger_scene(tmp_path, suffix):
     wanted = scene(3)
-    write_gaussians(tmp_path / f"x.{suffix}", wanted)
+    write_splats(tmp_path / f"x.{suffix}", wanted)
     subprocess.run(["splat-transform", "-q", tmp_path / f"x.{suffix}", tmp_path / "y.ply"], check=True)
-    close(read_gaussians(tmp_path / "y.ply"), wanted, BOUNDS[suffix])
+    close(read_splats(tmp_path / "y.ply"), wanted, BOUNDS[suffix])
 
 
 def test_plyfile_reads_a_compressed_ply(tmp_path):
-    write_gaussians(tmp_path / "x.compressed.ply", scene(1))
+    write_splats(tmp_path / "x.compressed.ply", scene(1))
     ply = plyfile.PlyData.read(tmp_path / "x.compressed.ply")
     assert [(e.name, e.count, len(e.properties)) for e in ply.elements] == [
         ("chunk", 3, 18),
@@ -174,24 +174,24 @@ def test_plyfile_reads_a_compressed_ply(tmp_path):
 
 
 def test_a_compressed_ply_named_ply_is_read_too(tmp_path):
-    write_gaussians(tmp_path / "x.compressed.ply", scene(1))
+    write_splats(tmp_path / "x.compressed.ply", scene(1))
     shutil.copy(tmp_path / "x.compressed.ply", tmp_path / "y.ply")
     np.testing.assert_array_equal(
-        read_gaussians(tmp_path / "y.ply").means, read_gaussians(tmp_path / "x.compressed.ply").means
+        read_splats(tmp_path / "y.ply").means, read_splats(tmp_path / "x.compressed.ply").means
     )
 
 
 def test_a_chunk_without_colour_bounds_is_read(tmp_path):
     """As SuperSplat wrote them before 2024: colours are in [0, 1]."""
     wanted = scene(0, count=3)
-    write_gaussians(tmp_path / "x.compressed.ply", wanted)
+    write_splats(tmp_path / "x.compressed.ply", wanted)
     head, mark, body = (tmp_path / "x.compressed.ply").read_bytes().partition(b"end_header\n")
     for name in ("min_r", "min_g", "min_b", "max_r", "max_g", "max_b"):
         head = head.replace(f"property float {name}\n".encode(), b"")
     words = bytearray(body[72:])
     words[12:16] = struct.pack("<I", 255 << 24 | 51 << 8 | 128)  # the first: red 1, green 0, blue 0.2
     (tmp_path / "x.compressed.ply").write_bytes(head + mark + body[:48] + words)
-    rgb = 0.5 + SH_C0 * np.asarray(read_gaussians(tmp_path / "x.compressed.ply").sh)[0, 0]
+    rgb = 0.5 + SH_C0 * np.asarray(read_splats(tmp_path / "x.compressed.ply").sh)[0, 0]
     np.testing.assert_allclose(rgb, [1, 0, 0.2], atol=1e-6)
 
 
@@ -206,18 +206,18 @@ def test_spz_flips_spherical_harmonics_as_it_flips_axes():
 def test_a_large_spz_keeps_what_24_bits_hold(tmp_path, far):
     wanted = scene(0, count=2)
     wanted.means[1] = far
-    write_gaussians(tmp_path / "x.spz", wanted)
-    got = np.asarray(read_gaussians(tmp_path / "x.spz").means)
+    write_splats(tmp_path / "x.spz", wanted)
+    got = np.asarray(read_splats(tmp_path / "x.spz").means)
     np.testing.assert_allclose(got, wanted.means, atol=max(2.0 * far / 2**23, 0.5 / 4096))  # a step is <= 2 far / 2^23
     wanted.means[1] = 1e7
     with pytest.raises(InputError, match=r"x.spz reaches 1e\+07 m, .* write a PLY"):
-        write_gaussians(tmp_path / "x.spz", wanted)
+        write_splats(tmp_path / "x.spz", wanted)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_an_empty_scene_round_trips(tmp_path, suffix):
-    write_gaussians(tmp_path / f"x.{suffix}", scene(0, dead=range(N)))
-    assert read_gaussians(tmp_path / f"x.{suffix}").sh.shape == (0, 1, 3)
+    write_splats(tmp_path / f"x.{suffix}", scene(0, dead=range(N)))
+    assert read_splats(tmp_path / f"x.{suffix}").sh.shape == (0, 1, 3)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -227,8 +227,8 @@ def test_extreme_scenes_are_read_back(tmp_path, suffix):
     wanted = dataclasses.replace(wanted, means=np.ones((4, 3), np.float32))
     wanted.opacity_logits[:] = 80, -80, 0, 0
     wanted.log_scales[:] = np.float32([[-100, -100, -100], [9, 9, 9], [0, -100, 0], [0, 0, 0]])
-    write_gaussians(tmp_path / f"x.{suffix}", wanted)
-    got = read_gaussians(tmp_path / f"x.{suffix}")
+    write_splats(tmp_path / f"x.{suffix}", wanted)
+    got = read_splats(tmp_path / f"x.{suffix}")
     assert np.abs(np.asarray(got.means) - 1).max() <= 0.5 / 4096  # SPZ's step
     assert alpha(np.asarray(got.opacity_logits)).max() > 0.998 and alpha(np.asarray(got.opacity_logits)).min() < 0.002
 
@@ -238,12 +238,12 @@ def test_nothing_is_written_of_values_that_are_not_finite(tmp_path, suffix):
     bad = scene(1)
     bad.means[2, 1] = np.nan
     with pytest.raises(InputError, match="1 values of its 600 Gaussians are not finite"):
-        write_gaussians(tmp_path / f"x.{suffix}", bad)
+        write_splats(tmp_path / f"x.{suffix}", bad)
     assert not os.listdir(tmp_path)
 
 
 def test_unknown_suffixes(tmp_path):
-    for act in (read_gaussians, lambda path: write_gaussians(path, scene())):
+    for act in (read_splats, lambda path: write_splats(path, scene())):
         with pytest.raises(InputError, match=r"x.sog has no scene format .* .compressed.ply, .ply, .spz, .splat"):
             act(tmp_path / "x.sog")
 
@@ -251,15 +251,15 @@ def test_unknown_suffixes(tmp_path):
 def refused(path, data, message):
     path.write_bytes(data)
     with pytest.raises(InputError, match=message) as caught:
-        read_gaussians(path)
+        read_splats(path)
     assert str(path) in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_bad_spz(tmp_path):
     path = tmp_path / "x.spz"
     with pytest.raises(InputError, match=r"x.spz cannot be read"):
-        read_gaussians(path)
-    write_gaussians(path, scene(1, count=9))
+        read_splats(path)
+    write_splats(path, scene(1, count=9))
     whole = path.read_bytes()
     plain = bytearray(gzip.decompress(whole))
 
@@ -309,7 +309,7 @@ def test_an_spz_bomb_is_not_unpacked(tmp_path, monkeypatch):
 
 def test_bad_splat(tmp_path):
     path = tmp_path / "x.splat"
-    write_gaussians(path, scene(0, count=3))
+    write_splats(path, scene(0, count=3))
     whole = path.read_bytes()
     refused(path, whole[:-1], "95 bytes, no multiple of 32: it is cut short")
     refused(path, whole[:4] + struct.pack("<f", np.nan) + whole[8:], "1 values of its 3 Gaussians are not finite")
@@ -319,7 +319,7 @@ def test_bad_splat(tmp_path):
 
 def test_bad_compressed_ply(tmp_path):
     path = tmp_path / "x.compressed.ply"
-    write_gaussians(path, scene(1))
+    write_splats(path, scene(1))
     whole = path.read_bytes()
     start = whole.index(b"end_header\n") + 11
     nan = struct.pack("<f", np.nan)
@@ -338,7 +338,7 @@ def test_bad_compressed_ply(tmp_path):
 def test_damaged_bytes(tmp_path, suffix):
     """Whatever bytes a file holds, a reader returns a finite scene or raises an InputError of one line."""
     path, rng = tmp_path / f"x.{suffix}", random.Random(suffix)
-    write_gaussians(path, scene(1, count=40))
+    write_splats(path, scene(1, count=40))
     whole = path.read_bytes()
     plain = gzip.decompress(whole) if suffix == "spz" else whole
     for round in range(80):
@@ -349,7 +349,7 @@ def test_damaged_bytes(tmp_path, suffix):
         data = data if rng.random() < 0.7 else data[: rng.randrange(len(data))]
         path.write_bytes(gzip.compress(data) if inside else data)
         try:
-            got = read_gaussians(path)
+            got = read_splats(path)
         except InputError as error:
             assert str(path) in str(error) and len(str(error).splitlines()) == 1
         else:

@@ -1,0 +1,81 @@
+"""The whole pipeline as a pure function: a box room that one panorama shows, on a tiny size."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import rein3d_jax as r3d
+from rein3d_jax.geometry.sphere import pixel_rays
+from rein3d_jax.pipeline.survey import room_background
+from rein3d_jax.restore import restorer
+
+HALF = jnp.array([2.0, 1.6, 1.3])  # metres: half sizes of the room
+HEIGHT, KEY = 64, jax.random.key(0)
+STAGES = r3d.Stages(
+    explore=r3d.explore.ExploreConfig(trajectories=2, step=0.5),
+    restore=r3d.restore.RestoreConfig(height=HEIGHT),
+    refine=r3d.refine.RefineConfig(
+        steps=2, batch=1, sh_degree=0, evaluate_every=1, densification="none", views=r3d.refine.ViewsConfig(size=16)
+    ),
+)
+
+
+@pytest.fixture(scope="module")
+def panorama() -> r3d.Panorama:
+    rays = pixel_rays(HEIGHT, 2 * HEIGHT)
+    distance = jnp.min(HALF / jnp.maximum(jnp.abs(rays), 1e-6), axis=-1)
+    rgb = 0.5 + 0.4 * jnp.sin(3 * rays * distance[..., None])
+    return r3d.Panorama(rgb, distance, distance > 0)
+
+
+@pytest.fixture(scope="module")
+def result(panorama) -> r3d.Reconstruction:
+    return r3d.reconstruct(panorama, KEY, stages=STAGES)
+
+
+def same_bytes(one, other) -> bool:
+    pairs = zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True)
+    return all(np.asarray(a).tobytes() == np.asarray(b).tobytes() for a, b in pairs)
+
+
+def test_it_gives_a_scene_and_how_it_came_about(panorama, result) -> None:
+    assert len(result.videos) == len(result.decisions.revealed) == 2
+    assert result.decisions.explored == "all paths taken" and result.decisions.refined == "all steps taken"
+    assert result.curves.loss[:, 0].tolist() == [1, 2] and result.curves.psnr[:, 0].tolist() == [0, 1, 2]
+    assert int(result.coarse.alive.sum()) == panorama.distance.size <= int(result.scene.alive.sum())
+    camera = r3d.equirectangular_camera(r3d.upright(jnp.zeros(3)), HEIGHT)
+    frame, _ = r3d.render(result.scene, camera)
+    error = jnp.abs(jnp.where(frame.distance > 0, frame.distance, jnp.nan) - panorama.distance)
+    assert float(jnp.nanmedian(error)) < 0.05  # metres: half a pixel's width on the walls
+
+
+def test_what_is_known_everywhere_stays_as_it_is(panorama, result) -> None:
+    np.testing.assert_array_equal(result.panorama.distance, panorama.distance)
+
+
+def test_it_repeats_to_the_byte_and_its_stages_joined_by_hand_give_the_same(panorama, result) -> None:
+    """The generators, one after another, as a caller who watches them would."""
+    known = r3d.survey(panorama, STAGES)
+    fill = restorer(STAGES.restore, room_background(panorama, STAGES.restore), None)
+    states = list(r3d.explore_and_restore(known, fill, jax.random.fold_in(KEY, 0), stages=STAGES))
+    (again,) = r3d.explore_and_restore(known, fill, jax.random.fold_in(KEY, 0), stages=STAGES, start=states[0])
+    assert same_bytes(again, states[1])  # on from a saved state
+    views = r3d.collect_views(panorama, [state.video for state in states], stages=STAGES)
+    for last in r3d.refine_scene(states[-1].scene, views, panorama, jax.random.fold_in(KEY, 1), stages=STAGES):
+        assert last.step <= STAGES.refine.steps
+    assert same_bytes(last.scene, result.scene)
+
+
+def test_a_limit_on_the_count_holds(panorama) -> None:
+    small = dataclasses.replace(STAGES, refine=dataclasses.replace(STAGES.refine, max_count=1000, steps=1))
+    assert int(r3d.reconstruct(panorama, KEY, stages=small).scene.alive.sum()) == 1000
+
+
+def test_without_a_known_distance_a_box_is_fitted(panorama) -> None:
+    unknown = panorama.replace(valid=jnp.zeros_like(panorama.valid))
+    placed, fitted = r3d.with_distance(unknown, STAGES)
+    assert fitted and bool(placed.valid.all()) and float(placed.distance.min()) > 0
+    assert not r3d.with_distance(panorama, STAGES)[1]
