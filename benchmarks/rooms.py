@@ -15,7 +15,7 @@ import numpy as np
 from rein3d_jax.geometry.poses import rigid
 from rein3d_jax.geometry.sphere import world_from_camera_axes
 from rein3d_jax.rooms.config import RoomConfig
-from rein3d_jax.rooms.generate import room
+from rein3d_jax.rooms.generate import generate_room
 from rein3d_jax.rooms.tracing.trace import trace
 
 
@@ -36,7 +36,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def measure(height: int, frames: int, samples: int, rooms: int) -> dict:
     """Compile seconds of a room and of its panoramas, and panoramas a second in each room."""
-    make, make_seconds = _compiled(jax.jit(room, static_argnums=1), jax.random.key(0), RoomConfig())
+    make, make_seconds = _compiled(jax.jit(generate_room, static_argnums=1), jax.random.key(0), RoomConfig())
     poses = jax.vmap(lambda x: rigid(world_from_camera_axes(), jnp.stack([x, 0 * x, 0 * x])))(
         jnp.linspace(0, 0.3, frames)
     )

@@ -3,11 +3,11 @@
 import jax
 import jax.numpy as jnp
 
-from rein3d_jax.rooms.config import KINDS, RoomConfig
-from rein3d_jax.rooms.furniture.catalogue import NONE, SLOTS, texture_groups
-from rein3d_jax.rooms.furniture.footprints import NOWHERE, join
-from rein3d_jax.rooms.furniture.furnish import Furniture, Parts, furnish, parts_of
-from rein3d_jax.rooms.furniture.template import BOX, CYLINDER, ELLIPSOID, TEXTURES
+from rein3d_jax.rooms.config import ROOM_KINDS, RoomConfig
+from rein3d_jax.rooms.furniture.catalogue import NO_PIECE, SLOTS, texture_groups
+from rein3d_jax.rooms.furniture.footprints import NOWHERE, join_footprints
+from rein3d_jax.rooms.furniture.furnish import Furniture, Parts, parts_of, place_furniture
+from rein3d_jax.rooms.furniture.template import BOX, CYLINDER, ELLIPSOID, MAX_TEXTURES
 from rein3d_jax.rooms.lighting import draw_exposure, draw_lights, draw_outside, reflected
 from rein3d_jax.rooms.materials import GROUP_INDEX, draw_textures
 from rein3d_jax.rooms.model import Room, Solids, Textures
@@ -19,7 +19,7 @@ _FIRST_STRUCTURE = _SHELL + OPENINGS
 _FIRST_PIECE = _FIRST_STRUCTURE + 1
 
 
-def room(key: jax.Array, config: RoomConfig = RoomConfig()) -> Room:
+def generate_room(key: jax.Array, config: RoomConfig = RoomConfig()) -> Room:
     """A room around a camera at the origin, 1.6 m above the floor and config.clearance metres from all that stands.
 
     Pure; works under jit (config static) and vmap over keys. Nothing stands in walls or in other things. What found no
@@ -28,10 +28,10 @@ def room(key: jax.Array, config: RoomConfig = RoomConfig()) -> Room:
     keys = iter(jax.random.split(key, 14))
     kind = jax.random.categorical(next(keys), jnp.log(jnp.array(config.mix)))
     plan = draw_plan(next(keys), kind)
-    windowless = jnp.where(kind == KINDS.index("bathroom"), 0.5, 0.2)
+    windowless = jnp.where(kind == ROOM_KINDS.index("bathroom"), 0.5, 0.2)
     openings, before = draw_openings(next(keys), plan, windowless)
-    taken = join(structure_footprints(plan), before, draw_walkway(next(keys), plan))
-    furniture = furnish(next(keys), plan, kind, taken, config.clearance, config.furnished)
+    taken = join_footprints(structure_footprints(plan), before, draw_walkway(next(keys), plan))
+    furniture = place_furniture(next(keys), plan, kind, taken, config.clearance, config.furnished)
     textures = _textures(next(keys), kind, furniture)
     lights = draw_lights(next(keys), plan, furniture, openings)
     boost = jax.random.uniform(next(keys), minval=0.8, maxval=1.7)
@@ -58,10 +58,10 @@ def room(key: jax.Array, config: RoomConfig = RoomConfig()) -> Room:
 
 
 def _textures(key: jax.Array, kind: jax.Array, furniture: Furniture) -> Textures:
-    """Shell, openings, structure, then TEXTURES for each piece. Walls are often alike, one may stand out."""
+    """Shell, openings, structure, then MAX_TEXTURES for each piece. Walls are often alike, one may stand out."""
     draw_key, alike_key, accent_key, which_key = jax.random.split(key, 4)
-    wet = (kind == KINDS.index("bathroom")) | (kind == KINDS.index("kitchen"))
-    tiled = kind == KINDS.index("bathroom")
+    wet = (kind == ROOM_KINDS.index("bathroom")) | (kind == ROOM_KINDS.index("kitchen"))
+    tiled = kind == ROOM_KINDS.index("bathroom")
     wall = jnp.where(tiled, GROUP_INDEX["wet_wall"], GROUP_INDEX["wall"])
     floor = jnp.where(wet, GROUP_INDEX["wet_floor"], GROUP_INDEX["floor"])
     accent = jax.random.bernoulli(accent_key, 0.55) & (jnp.arange(4) == jax.random.randint(which_key, (), 0, 4))
@@ -77,7 +77,7 @@ def _textures(key: jax.Array, kind: jax.Array, furniture: Furniture) -> Textures
 
 
 def texture_groups_of(furniture: Furniture) -> jax.Array:
-    """(SLOTS, TEXTURES) what each piece is made of, as indices into materials.GROUPS."""
+    """(SLOTS, MAX_TEXTURES) what each piece is made of, as indices into materials.GROUPS."""
     return jnp.asarray(texture_groups())[furniture.piece]
 
 
@@ -86,13 +86,13 @@ def _solids(plan: Plan, furniture: Furniture, parts: Parts, config: RoomConfig) 
     low, high = plan.structure_low, plan.structure_high
     zero = jnp.int32(0)
     piece = jnp.broadcast_to(jnp.arange(SLOTS)[:, None], parts.there.shape)
-    textures = _FIRST_PIECE + piece * TEXTURES + parts.texture
-    furnishing = Solids(parts.centre, parts.half, parts.turn, textures, _FIRST_PIECE + piece, zero, zero)
+    textures = _FIRST_PIECE + piece * MAX_TEXTURES + parts.texture
+    furnishing = Solids(parts.centre, parts.half, parts.heading, textures, _FIRST_PIECE + piece, zero, zero)
     furnishing = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]) if x.ndim else x, furnishing)
     unturned, first = jnp.tile(jnp.array([1.0, 0.0]), (STRUCTURE, 1)), jnp.full(STRUCTURE, _FIRST_STRUCTURE)
     structure = Solids((low + high) / 2, (high - low) / 2, unturned, first, first, zero, zero)
     every = jax.tree.map(lambda a, b: jnp.concatenate([a, b]) if a.ndim else a, structure, furnishing)
-    there = parts.there & (furniture.piece != NONE)[:, None]
+    there = parts.there & (furniture.piece != NO_PIECE)[:, None]
     there, shape, casts = (
         jnp.concatenate([a, b.reshape(-1)])
         for a, b in (

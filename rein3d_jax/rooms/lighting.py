@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from rein3d_jax.rooms.furniture.catalogue import NAMES
+from rein3d_jax.rooms.furniture.catalogue import PIECE_NAMES
 from rein3d_jax.rooms.furniture.furnish import Furniture
 from rein3d_jax.rooms.materials import linear_from_hsv
 from rein3d_jax.rooms.model import Lights, Openings, Outside, Textures
@@ -22,7 +22,7 @@ def draw_lights(key: jax.Array, plan: Plan, furniture: Furniture, openings: Open
     hung = _is_any(furniture.piece[0], ("pendant", "ceiling_disc", "spots"))
     first = jnp.where(hung, furniture.place.centre[0], spots[0])
     below = jnp.where(
-        furniture.piece[0] == NAMES.index("pendant"), ceiling - furniture.size[0, 2] - 0.02, ceiling - 0.2
+        furniture.piece[0] == PIECE_NAMES.index("pendant"), ceiling - furniture.size[0, 2] - 0.02, ceiling - 0.2
     )
     at_ceiling = [jnp.append(first, below), jnp.append(spots[1], ceiling - 0.25)]
     panes = [_window(openings, index) for index in (0, 1)]
@@ -52,7 +52,7 @@ def draw_lights(key: jax.Array, plan: Plan, furniture: Furniture, openings: Open
 
 
 def _is_any(piece: jax.Array, names: tuple[str, ...]) -> jax.Array:
-    return jnp.isin(piece, jnp.array([NAMES.index(name) for name in names]))
+    return jnp.isin(piece, jnp.array([PIECE_NAMES.index(name) for name in names]))
 
 
 def _window(openings: Openings, index: int) -> tuple[jax.Array, jax.Array, jax.Array]:

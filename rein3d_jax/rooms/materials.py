@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from rein3d_jax.geometry.colour import linear_from_srgb
 from rein3d_jax.rooms.model import Textures
 
 _NO_CELLS = 1000.0  # metres: one cell covers everything
@@ -39,7 +40,7 @@ _TILES = {"cell_u": (0.15, 0.7), "joint": (0.004, 0.02), "joint_shade": (0.35, 1
 _TILES |= {"spread": (0.02, 0.2), "saturation": (0, 0.25), "value": (0.45, 0.95), "grain_u": (0.08, 0.5)}
 _CLOTH = {"saturation": (0.03, 0.45), "value": (0.2, 0.85), "grain_u": (0.01, 0.08), "spread": (0.08, 0.3)}
 
-RECIPES = {
+_RECIPES = {
     "paint_white": {"hue": (0.03, 0.2), "saturation": (0, 0.13), "value": (0.7, 0.95), "spread": (0.01, 0.06)},
     "paint_tint": {"saturation": (0.08, 0.3), "value": (0.55, 0.85), "spread": (0.01, 0.06)},
     "paint_bold": {"saturation": (0.25, 0.6), "value": (0.35, 0.8), "spread": (0.01, 0.06)},
@@ -85,46 +86,24 @@ RECIPES = {
     "picture": {"saturation": (0.1, 0.7), "value": (0.3, 0.8), "spread": (0.3, 0.8), "hue_spread": (0.05, 0.5)}
     | {"grain_u": (0.1, 0.5), "grain_aspect": (0.5, 2.0), "contrast": (1.5, 4), "detail": (0.4, 0.9)},
     "books": {"saturation": (0.2, 0.7), "value": (0.3, 0.7), "spread": (0.4, 0.8), "hue_spread": (0.1, 0.5)}
-    | {
-        "cell_u": (0.025, 0.06),
-        "aspect": (0.03, 0.06),
-        "variation": (0.2, 0.5),
-        "grain_u": (0.5, 1),
-        "contrast": (2, 3),
-    },
+    | {"cell_u": (0.025, 0.06), "aspect": (0.03, 0.06), "variation": (0.2, 0.5), "grain_u": (0.5, 1)}
+    | {"contrast": (2, 3)},
     "rug": _CLOTH
     | {"cell_u": (0.1, 0.8), "aspect": (0.5, 2), "variation": (0.1, 0.4), "hue_spread": (0, 0.3), "contrast": (1, 3)}
     | {"grain_u": (0.1, 0.6), "shift": (0, 0.5)},
-    "lampshade": {
-        "hue": (0.07, 0.14),
-        "saturation": (0.03, 0.2),
-        "value": (0.9, 0.97),
-        "glow": (0.9, 3),
-        "spread": (0, 0.03),
-    },
+    "lampshade": {"hue": (0.07, 0.14), "saturation": (0.03, 0.2), "value": (0.9, 0.97), "glow": (0.9, 3)}
+    | {"spread": (0, 0.03)},
 }
 
 # What a part or a surface may be made of, with weights.
 GROUPS = {
     "wall": {"paint_white": 5, "paint_tint": 5, "paint_bold": 2.5, "plaster": 1, "wallpaper": 1},
     "accent": {
-        "paint_tint": 1,
-        "paint_bold": 2.5,
-        "plaster": 1.5,
-        "wallpaper": 1,
-        "brick": 3,
-        "pebbles": 1.5,
-        "wood": 0.7,
+        "paint_tint": 1, "paint_bold": 2.5, "plaster": 1.5, "wallpaper": 1, "brick": 3, "pebbles": 1.5, "wood": 0.7,
     },
     "wet_wall": {"wall_tile": 5, "paint_white": 1, "paint_tint": 1.5, "marble": 1},
     "floor": {
-        "planks": 4,
-        "parquet": 3,
-        "floor_tile": 1.5,
-        "marble": 1.2,
-        "terracotta": 1,
-        "slate": 1,
-        "concrete": 0.7,
+        "planks": 4, "parquet": 3, "floor_tile": 1.5, "marble": 1.2, "terracotta": 1, "slate": 1, "concrete": 0.7,
         "carpet": 1.2,
     },
     "wet_floor": {"floor_tile": 4, "marble": 2, "terracotta": 1, "slate": 2, "concrete": 0.5},
@@ -142,19 +121,19 @@ GROUPS = {
         for name in ("books", "picture", "rug", "leaf", "metal", "ceramic", "screen", "mirror", "lampshade")
     },
     "stone": {"marble": 2, "concrete": 1, "wood": 1.5, "black": 0.7, "slate": 0.5},
-}
+}  # fmt: skip
 GROUP_INDEX = {name: i for i, name in enumerate(GROUPS)}
 
 
 def _ranges() -> np.ndarray:
     """(recipes, numbers, 2)."""
-    rows = [list((_DEFAULT | recipe).values()) for recipe in RECIPES.values()]
+    rows = [list((_DEFAULT | recipe).values()) for recipe in _RECIPES.values()]
     return np.array(rows, np.float32)
 
 
 def _weights() -> np.ndarray:
     """(groups, recipes)."""
-    return np.array([[group.get(name, 0) for name in RECIPES] for group in GROUPS.values()], np.float32)
+    return np.array([[group.get(name, 0) for name in _RECIPES] for group in GROUPS.values()], np.float32)
 
 
 def draw_textures(key: jax.Array, groups: jax.Array) -> Textures:
@@ -167,13 +146,13 @@ def draw_textures(key: jax.Array, groups: jax.Array) -> Textures:
     low, high = (jnp.where(length, jnp.log(jnp.maximum(x, _SMALLEST)), x) for x in (low, high))
     drawn = low + (high - low) * share
     number = dict(zip(_DEFAULT, jnp.moveaxis(jnp.where(length, jnp.exp(drawn), drawn), -1, 0), strict=True))
-    turn = jnp.where(jax.random.bernoulli(signs, 0.5, groups.shape), 1.0, -1.0)
-    return _texture(number, turn)
+    sign = jnp.where(jax.random.bernoulli(signs, 0.5, groups.shape), 1.0, -1.0)
+    return _texture(number, sign)
 
 
-def _texture(number: dict, turn: jax.Array) -> Textures:
+def _texture(number: dict, hue_sign: jax.Array) -> Textures:
     steps = jnp.array([-1.0, 0.0, 1.0])
-    hue = number["hue"][:, None] + (turn * number["hue_spread"])[:, None] * steps
+    hue = number["hue"][:, None] + (hue_sign * number["hue_spread"])[:, None] * steps
     value = number["value"][:, None] * (1 + number["spread"][:, None] * steps)
     ramp = linear_from_hsv(hue, number["saturation"][:, None], jnp.clip(value, 0.01, 0.97))
     return Textures(
@@ -185,8 +164,8 @@ def _texture(number: dict, turn: jax.Array) -> Textures:
 
 
 def linear_from_hsv(hue: jax.Array, saturation: jax.Array, value: jax.Array) -> jax.Array:
-    """Hue (in turns), saturation and value of an sRGB colour -> linear (..., 3)."""
+    """Linear colour (..., 3) of hue (a share of the circle), saturation and value of an sRGB colour."""
     third = jnp.array([0.0, 2 / 3, 1 / 3])
     wheel = jnp.clip(jnp.abs(jnp.mod(hue[..., None] + third, 1.0) * 6 - 3) - 1, 0, 1)
     srgb = value[..., None] * (1 - saturation[..., None] * (1 - wheel))
-    return jnp.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    return linear_from_srgb(srgb)

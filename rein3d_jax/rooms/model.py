@@ -1,5 +1,5 @@
-"""What a room is made of, as pytrees of fixed capacity. Fields only. Everything is in the room's own axes: metres,
-origin at the input camera, walls along x and y, +Z up; `yaw` turns them into the world."""
+"""A room's parts as pytrees of fixed capacity. Fields only. Everything is in the room's own axes: metres,
+origin at the input camera, walls along x and y, +Z up; `yaw` brings them into the world."""
 
 import jax
 from flax import struct
@@ -7,12 +7,12 @@ from flax import struct
 
 @struct.dataclass
 class Solids:
-    """Unit shapes (cube, upright cylinder or ball of radius 1), scaled, turned and moved. Only the first `count` are
+    """Unit shapes (cube, upright cylinder or ball of radius 1), scaled, yawed and moved. Only the first `count` are
     used; the others lie far away."""
 
     centre: jax.Array  # (n, 3) metres
     half: jax.Array  # (n, 3) metres, half the size along the solid's own axes
-    turn: jax.Array  # (n, 2) cosine and sine of the angle it is turned LEFT about +Z
+    heading: jax.Array  # (n, 2) cosine and sine of the angle it is yawed LEFT about +Z
     texture: jax.Array  # (n,) int, its row of Room.textures
     object: jax.Array  # (n,) int, the piece of furniture it belongs to
     count: jax.Array  # () int
@@ -23,7 +23,7 @@ class Solids:
 class Textures:
     """Procedural textures: joints of a grid of cells over a grain of noise. Colours are linear reflectances."""
 
-    ramp: jax.Array  # (m, 3, 3) colours that the noise walks through, low to high
+    ramp: jax.Array  # (m, 3, 3) colours that the noise runs through, low to high
     cell: jax.Array  # (m, 2) metres, the size of a tile, plank or brick
     shift: jax.Array  # (m,) share of a cell by which each row is moved against the one below
     joint: jax.Array  # (m,) metres, the width of the joints
@@ -31,7 +31,7 @@ class Textures:
     variation: jax.Array  # (m,) how much the cells differ in brightness
     grain: jax.Array  # (m, 2) metres, wavelength of the coarsest noise
     detail: jax.Array  # (m,) amplitude of each octave relative to the coarser one
-    contrast: jax.Array  # (m,) how far the noise walks along the ramp
+    contrast: jax.Array  # (m,) how far the noise runs along the ramp
     glow: jax.Array  # (m,) light it sends out itself, per reflectance, already exposed
 
 
@@ -74,8 +74,8 @@ class Room:
 
     low: jax.Array  # (3,) metres, the shell's lower corner
     high: jax.Array  # (3,) metres, the shell's upper corner
-    yaw: jax.Array  # () radians the room is turned LEFT in the world
-    kind: jax.Array  # () int, index into config.KINDS
+    yaw: jax.Array  # () radians the room is yawed LEFT in the world
+    kind: jax.Array  # () int, index into config.ROOM_KINDS
     seed: jax.Array  # () uint32 of the textures' noise
     boxes: Solids
     cylinders: Solids
@@ -92,7 +92,7 @@ class Room:
 
 
 @struct.dataclass
-class View:
+class TracedPanorama:
     """A traced panorama, or several along leading axes."""
 
     rgb: jax.Array  # (..., h, w, 3) sRGB in [0, 1]

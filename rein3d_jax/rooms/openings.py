@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 
-from rein3d_jax.rooms.furniture.footprints import NOWHERE, Footprint, join, overlap
+from rein3d_jax.rooms.furniture.footprints import NOWHERE, Footprint, footprints_overlap, join_footprints
 from rein3d_jax.rooms.model import Openings
 from rein3d_jax.rooms.plan import Plan, structure_footprints
 
@@ -24,7 +24,7 @@ def draw_openings(key: jax.Array, plan: Plan, windowless: jax.Array) -> tuple[Op
         tries_key, there_key, kind_key = jax.random.split(row_key, 3)
         window = (index < 2) | ((index == 3) & jax.random.bernoulli(kind_key, 0.5))
         tries = jax.vmap(lambda k: _candidate(k, plan, window))(jax.random.split(tries_key, _TRIES))
-        fits = ~jnp.any(jax.vmap(lambda one: overlap(one, taken))(tries[1]), axis=-1) & tries[2]
+        fits = ~jnp.any(jax.vmap(lambda one: footprints_overlap(one, taken))(tries[1]), axis=-1) & tries[2]
         missing = jnp.where(window, windowless, jnp.where(index == 2, 0.15, 0.5))
         there = jnp.any(fits) & ~jax.random.bernoulli(there_key, missing)
         opening, before, _ = jax.tree.map(lambda x: x[jnp.argmax(fits)], tries)
@@ -33,7 +33,7 @@ def draw_openings(key: jax.Array, plan: Plan, windowless: jax.Array) -> tuple[Op
         return jax.tree.map(lambda x, new: x.at[index].set(new), taken, before), opening
 
     rows = jnp.arange(OPENINGS), jax.random.split(key, OPENINGS)
-    taken, openings = jax.lax.scan(cut, join(absent, structure), rows)
+    taken, openings = jax.lax.scan(cut, join_footprints(absent, structure), rows)
     return openings, jax.tree.map(lambda x: x[:OPENINGS], taken)
 
 

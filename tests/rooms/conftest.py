@@ -7,7 +7,7 @@ import pytest
 from rein3d_jax.geometry.poses import rigid
 from rein3d_jax.geometry.sphere import world_from_camera_axes
 from rein3d_jax.rooms.config import RoomConfig
-from rein3d_jax.rooms.generate import room
+from rein3d_jax.rooms.generate import generate_room
 from rein3d_jax.rooms.tracing.trace import trace
 
 ROOMS = 64
@@ -29,7 +29,7 @@ def tracer():
 def many_rooms():
     """ROOMS rooms along a leading axis, their windows closed: every ray has a distance."""
     closed = RoomConfig(open_windows=0.0)
-    return jax.jit(jax.vmap(lambda key: room(key, closed)))(jax.random.split(jax.random.key(7), ROOMS))
+    return jax.jit(jax.vmap(lambda key: generate_room(key, closed)))(jax.random.split(jax.random.key(7), ROOMS))
 
 
 @pytest.fixture(scope="session")

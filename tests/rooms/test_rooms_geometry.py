@@ -7,7 +7,7 @@ import pytest
 
 from rein3d_jax.geometry.sphere import rays_of_pose
 from rein3d_jax.rooms.config import RoomConfig
-from rein3d_jax.rooms.generate import room as room_from
+from rein3d_jax.rooms.generate import generate_room
 
 HEIGHT = 64
 ATOL = 1e-4  # metres: the issue's bar
@@ -17,9 +17,9 @@ GRAZING = 0.02  # of |ray.normal|: a ray that only touches a curved solid meets 
 def rays_in_room(room, pose):
     """Origin (3,) and rays (n, 3) in the room's axes, float64."""
     yaw = float(room.yaw)
-    turn = np.array([[np.cos(yaw), np.sin(yaw), 0], [-np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+    heading = np.array([[np.cos(yaw), np.sin(yaw), 0], [-np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
     rays = np.asarray(rays_of_pose(pose, HEIGHT, 2 * HEIGHT), np.float64).reshape(-1, 3)
-    return turn @ np.asarray(pose[:3, 3], np.float64), rays @ turn.T
+    return heading @ np.asarray(pose[:3, 3], np.float64), rays @ heading.T
 
 
 def solids_of(room):
@@ -27,8 +27,8 @@ def solids_of(room):
     for kind in ("boxes", "cylinders", "ellipsoids"):
         solids = jax.tree.map(np.asarray, getattr(room, kind))
         for i in range(int(solids.count)):
-            centre, half, turn = (x[i].astype(np.float64) for x in (solids.centre, solids.half, solids.turn))
-            yield kind, centre, half, *turn, int(solids.object[i])
+            centre, half, heading = (x[i].astype(np.float64) for x in (solids.centre, solids.half, solids.heading))
+            yield kind, centre, half, *heading, int(solids.object[i])
 
 
 def meet(kind, origin, rays, half):
@@ -121,7 +121,7 @@ def test_open_windows_have_a_colour_and_no_distance(many_rooms, room_of, tracer,
 def test_the_share_of_open_windows_is_the_config_s():
     keys = jax.random.split(jax.random.key(3), 64)
     for share in (0.0, 0.5, 1.0):
-        drawn = jax.vmap(lambda key, share=share: room_from(key, RoomConfig(open_windows=share)).open_windows)(keys)
+        drawn = jax.vmap(lambda key, share=share: generate_room(key, RoomConfig(open_windows=share)).open_windows)(keys)
         assert abs(float(drawn.mean()) - share) < 0.2  # 3 standard deviations of 64 draws
 
 
@@ -131,7 +131,7 @@ def test_every_ray_hits_and_normals_face_it(index, room_of, tracer, pose_at):
     view = jax.tree.map(lambda x: np.asarray(x[0]), tracer(room_of(index), pose[None], HEIGHT))
     assert np.isfinite(view.rgb).all() and view.rgb.min() >= 0 and view.rgb.max() <= 1
     assert view.distance.min() > 0.1 and view.distance.max() < 15  # rooms are 8 x 8 x 3.2 m at most
-    np.testing.assert_allclose(np.linalg.norm(view.normal, axis=-1), 1, atol=1e-5)  # float32 rsqrt and a turn
+    np.testing.assert_allclose(np.linalg.norm(view.normal, axis=-1), 1, atol=1e-5)  # float32 rsqrt and a heading
     rays = np.asarray(rays_of_pose(pose, HEIGHT, 2 * HEIGHT))
     assert (view.normal * rays).sum(-1).max() <= 1e-6
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rein3d_jax.rooms.furniture.catalogue import PIECES, size_ranges
-from rein3d_jax.rooms.furniture.footprints import Footprint, corners, distance_from_origin, overlap
+from rein3d_jax.rooms.furniture.footprints import Footprint, corners, distance_from_origin, footprints_overlap
 from rein3d_jax.rooms.tracing.pattern import fractal_noise, joints
 
 
@@ -34,28 +34,28 @@ def test_rectangles_overlap_exactly_when_a_point_is_in_both():
     centre = jax.random.uniform(keys[0], (2, n, 2), minval=-1, maxval=1)
     half = jax.random.uniform(keys[1], (2, n, 2), minval=0.1, maxval=0.7)
     angle = jax.random.uniform(keys[2], (2, n), maxval=6.0)
-    turn = jnp.stack([jnp.cos(angle), jnp.sin(angle)], -1)
-    a, b = (Footprint(centre[i], half[i], turn[i], jnp.tile(jnp.array([0.0, 1.0]), (n, 1))) for i in (0, 1))
+    heading = jnp.stack([jnp.cos(angle), jnp.sin(angle)], -1)
+    a, b = (Footprint(centre[i], half[i], heading[i], jnp.tile(jnp.array([0.0, 1.0]), (n, 1))) for i in (0, 1))
     grid = np.stack(np.meshgrid(*[np.linspace(-1, 1, 101)] * 2), -1).reshape(-1, 2)
 
     def within(points, box, slack):
-        c, s = box.turn[:, None, 0], box.turn[:, None, 1]
+        c, s = box.heading[:, None, 0], box.heading[:, None, 1]
         d = points - box.centre[:, None]
         own = jnp.stack([c * d[..., 0] + s * d[..., 1], c * d[..., 1] - s * d[..., 0]], -1)
         return jnp.all(jnp.abs(own) <= box.half[:, None] + slack, axis=-1)
 
-    c, s = a.turn[:, None, 0], a.turn[:, None, 1]
+    c, s = a.heading[:, None, 0], a.heading[:, None, 1]
     points = grid[None] * a.half[:, None]
     points = a.centre[:, None] + jnp.stack(
         [c * points[..., 0] - s * points[..., 1], s * points[..., 0] + c * points[..., 1]], -1
     )
     surely, perhaps = (np.asarray(within(points, b, slack).any(-1)) for slack in (-1e-5, 0.02))
-    got = np.asarray(overlap(a, b))
+    got = np.asarray(footprints_overlap(a, b))
     assert np.all(got[surely]) and np.all(perhaps[got])  # the grid's cells are 0.014 m at most
     assert 20 < got.sum() < n - 20
-    np.testing.assert_array_equal(got, overlap(b, a))
+    np.testing.assert_array_equal(got, footprints_overlap(b, a))
     above = b.replace(heights=b.heights + 1.0)
-    assert not np.any(overlap(a, above))  # touching is not sharing
+    assert not np.any(footprints_overlap(a, above))  # touching is not sharing
     nearest = np.linalg.norm(points, axis=-1).min(-1)
     np.testing.assert_allclose(distance_from_origin(a), nearest, atol=0.02)  # the grid again
     assert np.all(within(corners(a), a, 1e-5))

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rein3d_jax.rooms.generate import room
+from rein3d_jax.rooms.generate import generate_room
 from rein3d_jax.rooms.tracing.trace import trace
 
 HEIGHT = 64
@@ -50,7 +50,7 @@ def test_a_box_under_a_lamp_leaves_a_shadow_and_only_there(room_of, tracer, pose
     plate = bare.boxes.replace(
         centre=bare.boxes.centre.at[0].set(jnp.array([0.3, 0.0, -0.7])),
         half=bare.boxes.half.at[0].set(jnp.array([0.2, 0.2, 0.02])),
-        turn=bare.boxes.turn.at[0].set(jnp.array([1.0, 0.0])),
+        heading=bare.boxes.heading.at[0].set(jnp.array([1.0, 0.0])),
         count=jnp.int32(1),
         casters=jnp.int32(1),
     )
@@ -82,7 +82,7 @@ def test_it_exports_for_every_platform(pose_at):
     """Nothing in it is bound to a platform."""
 
     def panorama(key, poses):
-        return trace(room(key), poses, 16)
+        return trace(generate_room(key), poses, 16)
 
     key = jax.ShapeDtypeStruct((2,), jnp.uint32)
     poses = jax.ShapeDtypeStruct((2, 4, 4), jnp.float32)

@@ -4,30 +4,31 @@ import jax
 import numpy as np
 import pytest
 
+from rein3d_jax.conventions import EYE_HEIGHT
 from rein3d_jax.errors import InputError
-from rein3d_jax.rooms.config import EYE_HEIGHT, KINDS, PAPER_MIX, RoomConfig
-from rein3d_jax.rooms.generate import pack, room
+from rein3d_jax.rooms.config import PAPER_MIX, ROOM_KINDS, RoomConfig
+from rein3d_jax.rooms.generate import generate_room, pack
 
 FIRST_PIECE = 11  # object ids: 6 faces, 4 openings, structure
 ATOL = 1e-3  # metres: float32 sums of metres; touching is allowed
 
 
 def boxes_of(rooms, index):
-    """centre, half, turn, object of the boxes used in room `index`, float64."""
+    """centre, half, heading, object of the boxes used in room `index`, float64."""
     boxes = jax.tree.map(lambda x: np.asarray(x[index]), rooms.boxes)
-    return [x[: boxes.count].astype(np.float64) for x in (boxes.centre, boxes.half, boxes.turn, boxes.object)]
+    return [x[: boxes.count].astype(np.float64) for x in (boxes.centre, boxes.half, boxes.heading, boxes.object)]
 
 
-def plan_corners(centre, half, turn):
+def plan_corners(centre, half, heading):
     """(n, 4, 2)."""
-    c, s = turn[:, 0, None], turn[:, 1, None]
+    c, s = heading[:, 0, None], heading[:, 1, None]
     x, y = (half[:, i, None] * np.array(signs) for i, signs in ((0, (1, 1, -1, -1)), (1, (1, -1, -1, 1))))
     return centre[:, None, :2] + np.stack([c * x - s * y, s * x + c * y], -1)
 
 
 def test_same_key_same_bytes_and_vmap_is_a_loop(many_rooms):
     closed = RoomConfig(open_windows=0.0)
-    make, keys = jax.jit(lambda key: room(key, closed)), jax.random.split(jax.random.key(7), 64)
+    make, keys = jax.jit(lambda key: generate_room(key, closed)), jax.random.split(jax.random.key(7), 64)
     once, again = make(keys[3]), make(keys[3])
     assert all(
         jax.tree.leaves(jax.tree.map(lambda a, b: a.tobytes() == b.tobytes(), *map(jax.device_get, (once, again))))
@@ -46,16 +47,16 @@ def test_sizes_are_those_of_rooms(many_rooms):
 
 
 def test_kinds_come_in_the_paper_s_mix(many_rooms):
-    share = np.bincount(np.asarray(many_rooms.kind), minlength=len(KINDS)) / len(many_rooms.kind)
+    share = np.bincount(np.asarray(many_rooms.kind), minlength=len(ROOM_KINDS)) / len(many_rooms.kind)
     expected = np.array(PAPER_MIX) / sum(PAPER_MIX)
     assert np.all(np.abs(share - expected) < 4 * np.sqrt(expected * (1 - expected) / len(many_rooms.kind)))  # 4 sigma
 
 
 def test_boxes_stay_inside_the_shell(many_rooms):
     for index in range(len(many_rooms.kind)):
-        centre, half, turn, _ = boxes_of(many_rooms, index)
+        centre, half, heading, _ = boxes_of(many_rooms, index)
         low, high = (np.asarray(x[index], np.float64) for x in (many_rooms.low, many_rooms.high))
-        corners = plan_corners(centre, half, turn)
+        corners = plan_corners(centre, half, heading)
         assert np.all(corners >= low[:2] - 1e-4) and np.all(corners <= high[:2] + 1e-4)  # float32 metres
         assert np.all(centre[:, 2] - half[:, 2] >= low[2] - 1e-4)
         assert np.all(centre[:, 2] + half[:, 2] <= high[2] + 1e-4)
@@ -67,8 +68,8 @@ def test_the_camera_stands_clear(many_rooms):
         for name in ("boxes", "cylinders", "ellipsoids"):
             solids = jax.tree.map(lambda x, index=index: np.asarray(x[index]), getattr(many_rooms, name))
             n = int(solids.count)
-            centre, half, turn = solids.centre[:n], solids.half[:n], solids.turn[:n]
-            c, s = turn[:, 0], turn[:, 1]
+            centre, half, heading = solids.centre[:n], solids.half[:n], solids.heading[:n]
+            c, s = heading[:, 0], heading[:, 1]
             own = np.abs(np.stack([c * centre[:, 0] + s * centre[:, 1], c * centre[:, 1] - s * centre[:, 0]], -1))
             away = np.linalg.norm(np.maximum(own - half[:, :2], 0), axis=-1)
             in_the_way = (centre[:, 2] + half[:, 2] > -1.57) & (centre[:, 2] - half[:, 2] < 0.3)
@@ -77,9 +78,9 @@ def test_the_camera_stands_clear(many_rooms):
 
 def test_no_box_has_its_centre_in_another_object(many_rooms):
     for index in range(len(many_rooms.kind)):
-        centre, half, turn, name = boxes_of(many_rooms, index)
+        centre, half, heading, name = boxes_of(many_rooms, index)
         between = centre[:, None] - centre[None]
-        c, s = turn[:, 0], turn[:, 1]
+        c, s = heading[:, 0], heading[:, 1]
         own = np.stack(
             [c * between[..., 0] + s * between[..., 1], c * between[..., 1] - s * between[..., 0], between[..., 2]], -1
         )
@@ -106,5 +107,5 @@ def test_a_full_buffer_is_confessed(many_rooms):
 
 @pytest.mark.parametrize("wrong", [{"mix": (1.0,)}, {"clearance": 2.0}, {"furnished": 1.5}, {"boxes": 12}])
 def test_a_config_says_what_is_wrong(wrong):
-    with pytest.raises(InputError, match=f"rooms.{next(iter(wrong))}"):
+    with pytest.raises(InputError, match=f"^{next(iter(wrong))} must be "):
         RoomConfig(**wrong)

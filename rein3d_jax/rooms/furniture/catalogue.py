@@ -2,17 +2,17 @@
 
 import numpy as np
 
-from rein3d_jax.rooms.config import KINDS
-from rein3d_jax.rooms.furniture.hung import PIECES as HUNG
-from rein3d_jax.rooms.furniture.seats import PIECES as SEATS
-from rein3d_jax.rooms.furniture.storage import PIECES as STORAGE
-from rein3d_jax.rooms.furniture.template import PARTS, TEXTURES
-from rein3d_jax.rooms.furniture.wet import PIECES as WET
+from rein3d_jax.rooms.config import ROOM_KINDS
+from rein3d_jax.rooms.furniture.hung import HUNG_PIECES
+from rein3d_jax.rooms.furniture.seats import SEAT_PIECES
+from rein3d_jax.rooms.furniture.storage import STORAGE_PIECES
+from rein3d_jax.rooms.furniture.template import MAX_PARTS, MAX_TEXTURES
+from rein3d_jax.rooms.furniture.wet import WET_PIECES
 from rein3d_jax.rooms.materials import GROUP_INDEX
 
-PIECES = SEATS | STORAGE | WET | HUNG
-NAMES = tuple(PIECES)
-NONE = len(NAMES)  # the index that stands for no piece
+PIECES = SEAT_PIECES | STORAGE_PIECES | WET_PIECES | HUNG_PIECES
+PIECE_NAMES = tuple(PIECES)
+NO_PIECE = len(PIECE_NAMES)  # the index that stands for no piece
 
 _PICTURES = ({"picture": 3, "wall_shelf": 1, "mirror": 0.5}, {"picture": 3, "wall_shelf": 1, "none": 1.5})
 _LAMP = {"pendant": 3, "ceiling_disc": 3, "spots": 1.5}
@@ -56,11 +56,11 @@ PLACES = ("wall", "free", "hung", "flat", "ceiling")
 
 def program_weights() -> np.ndarray:
     """(kinds, SLOTS, pieces + 1): the last column is no piece."""
-    table = np.zeros((len(KINDS), SLOTS, NONE + 1), np.float32)
-    for kind, name in enumerate(KINDS):
+    table = np.zeros((len(ROOM_KINDS), SLOTS, NO_PIECE + 1), np.float32)
+    for kind, name in enumerate(ROOM_KINDS):
         for slot, weights in enumerate(PROGRAMS[name]):
             for piece, weight in weights.items():
-                table[kind, slot, NONE if piece == "none" else NAMES.index(piece)] = weight
+                table[kind, slot, NO_PIECE if piece == "none" else PIECE_NAMES.index(piece)] = weight
     return table
 
 
@@ -76,19 +76,19 @@ def places() -> np.ndarray:
 
 
 def texture_groups() -> np.ndarray:
-    """(pieces + 1, TEXTURES) index into materials.GROUPS; the last one fills up."""
+    """(pieces + 1, MAX_TEXTURES) index into materials.GROUPS; the last one fills up."""
     rows = [[GROUP_INDEX[name] for name in p.textures] for p in PIECES.values()]
-    assert max(map(len, rows)) <= TEXTURES
-    return np.array([*(row + row[-1:] * (TEXTURES - len(row)) for row in rows), [0] * TEXTURES])
+    assert max(map(len, rows)) <= MAX_TEXTURES
+    return np.array([*(row + row[-1:] * (MAX_TEXTURES - len(row)) for row in rows), [0] * MAX_TEXTURES])
 
 
 def part_tables() -> dict[str, np.ndarray]:
-    """For (pieces + 1, PARTS): bounds (.., 3, 2, 4) in W, D, H, M; shape; texture; casts; chance, 0 for no part."""
-    count = (NONE + 1, PARTS)
+    """For (pieces + 1, MAX_PARTS): bounds (.., 3, 2, 4) in W, D, H, M; shape; texture; casts; chance, 0 for no part."""
+    count = (NO_PIECE + 1, MAX_PARTS)
     bounds, shape, texture = np.zeros((*count, 3, 2, 4), np.float32), np.zeros(count, int), np.zeros(count, int)
     chance, casts = np.zeros(count, np.float32), np.zeros(count, bool)
     for i, (name, piece) in enumerate(PIECES.items()):
-        assert len(piece.parts) <= PARTS, f"{name} has {len(piece.parts)} parts, {PARTS} are the most"
+        assert len(piece.parts) <= MAX_PARTS, f"{name} has {len(piece.parts)} parts, {MAX_PARTS} are the most"
         for j, part in enumerate(piece.parts):
             bounds[i, j] = part.x, part.y, part.z
             shape[i, j], texture[i, j], chance[i, j] = part.shape, part.texture, part.chance

@@ -13,7 +13,7 @@ class Footprint:
 
     centre: jax.Array  # (..., 2) metres
     half: jax.Array  # (..., 2) metres
-    turn: jax.Array  # (..., 2) cosine and sine of the angle it is turned LEFT
+    heading: jax.Array  # (..., 2) cosine and sine of the angle it is yawed LEFT
     heights: jax.Array  # (..., 2) metres above the floor, from and to
 
 
@@ -23,11 +23,11 @@ _einsum = functools.partial(jnp.einsum, precision="highest")
 
 def _axes(a: Footprint) -> jax.Array:
     """(..., 2, 2): rows are the rectangle's own unit axes."""
-    c, s = a.turn[..., 0], a.turn[..., 1]
+    c, s = a.heading[..., 0], a.heading[..., 1]
     return jnp.stack([jnp.stack([c, s], -1), jnp.stack([-s, c], -1)], -2)
 
 
-def overlap(a: Footprint, b: Footprint) -> jax.Array:
+def footprints_overlap(a: Footprint, b: Footprint) -> jax.Array:
     """Whether two prisms share space; leading axes broadcast. Touching is not sharing. Separating axes: two rectangles
     are apart exactly if they are apart along one of their own four axes."""
     own = [_axes(a), _axes(b)]
@@ -58,10 +58,10 @@ def distance_from_origin(a: Footprint) -> jax.Array:
 def upright_box(low: jax.Array, high: jax.Array, floor: jax.Array) -> Footprint:
     """The footprint of boxes along the axes with corners (..., 3) metres."""
     centre, half = (low + high) / 2, jnp.abs(high - low) / 2
-    turn = jnp.broadcast_to(jnp.array([1.0, 0.0]), centre[..., :2].shape)
-    return Footprint(centre[..., :2], half[..., :2], turn, jnp.stack([low[..., 2], high[..., 2]], -1) - floor)
+    heading = jnp.broadcast_to(jnp.array([1.0, 0.0]), centre[..., :2].shape)
+    return Footprint(centre[..., :2], half[..., :2], heading, jnp.stack([low[..., 2], high[..., 2]], -1) - floor)
 
 
-def join(*parts: Footprint) -> Footprint:
+def join_footprints(*parts: Footprint) -> Footprint:
     """All rows of `parts`."""
     return jax.tree.map(lambda *rows: jnp.concatenate(rows), *parts)

@@ -14,16 +14,16 @@ from rein3d_jax.rooms.furniture.template import (
     box,
     cylinder,
     inset,
+    intervals,
     legs,
-    moved,
-    spread,
+    move_part,
 )
 
 _O = 0 * M  # the floor, or the middle
 
 
 def _chair(back: int, width: float = 0.42, texture: int = 1) -> tuple[Part, ...]:
-    """A chair at the origin, in metres; `back` = 1 when it looks along -y."""
+    """A chair at the origin, in metres; `back` = 1 when it faces -y."""
     half = width / 2
     side = (half - 0.04) * M if back > 0 else -half * M
     across = around(_O, half)
@@ -38,16 +38,16 @@ def _dining_chairs() -> tuple[Part, ...]:
     back, front = _chair(1), _chair(-1)
     places = [(-W / 4 + _O, D / 2 - 0.25 * M, back), (W / 4 + _O, D / 2 - 0.25 * M, back)]
     places += [(-W / 4 + _O, -D / 2 + 0.25 * M, front), (W / 4 + _O, -D / 2 + 0.25 * M, front)]
-    return tuple(moved(part, x, y) for x, y, chair in places for part in chair)
+    return tuple(move_part(part, x, y) for x, y, chair in places for part in chair)
 
 
 def _sofa_parts(seats: int) -> tuple[Part, ...]:
     arm, back = 0.18 * M, 0.22 * M
     inner = (-W / 2 + arm, W / 2 - arm)
     seat, lean = (-D / 2, D / 2 - back), (D / 2 - back, D / 2)
-    cushions = [box(0, inset(x, 0.008), seat, (0.52 * H, 0.64 * H)) for x in spread(seats, *inner)]
+    cushions = [box(0, inset(x, 0.008), seat, (0.52 * H, 0.64 * H)) for x in intervals(seats, *inner)]
     rests = [
-        box(0, inset(x, 0.008), (lean[0] - 0.12 * M, lean[0]), (0.65 * H, 1.03 * H)) for x in spread(seats, *inner)
+        box(0, inset(x, 0.008), (lean[0] - 0.12 * M, lean[0]), (0.65 * H, 1.03 * H)) for x in intervals(seats, *inner)
     ]
     return (
         box(0, ACROSS, DEEP, (0.08 * M, 0.5 * H)),
@@ -75,7 +75,7 @@ def _corner_sofa() -> tuple[Part, ...]:
         box(0, inset(chaise, 0.01), (-D / 2, D / 2 - 0.22 * M), (0.5 * H, 0.62 * H)),
         *(
             box(0, inset(x, 0.008), (back[0], D / 2 - 0.22 * M), (0.5 * H, 0.62 * H))
-            for x in spread(2, -W / 2 + 0.2 * M, W / 2 - 0.85 * M)
+            for x in intervals(2, -W / 2 + 0.2 * M, W / 2 - 0.85 * M)
         ),
         box(0, ACROSS, (D / 2 - 0.2 * M, D / 2), (0.48 * H, H)),
         box(0, (-W / 2, -W / 2 + 0.2 * M), back, (0.48 * H, 0.75 * H)),
@@ -89,7 +89,7 @@ def _corner_sofa() -> tuple[Part, ...]:
 def _bed(pillows: int) -> tuple[Part, ...]:
     head = D / 2 - 0.06 * M
     wide = inset(ACROSS, 0.03)
-    rows = spread(pillows, *inset(wide, 0.05))
+    rows = intervals(pillows, *inset(wide, 0.05))
     return (
         box(0, ACROSS, (-D / 2, head), (0.1 * M, 0.3 * M)),
         *legs(0, ACROSS, DEEP, 0.1 * M, 0.08),
@@ -134,33 +134,22 @@ def _round_table() -> tuple[Part, ...]:
 _DINING_TOP = (around(_O, W / 2 - 0.05 * M), around(_O, D / 2 - 0.35 * M))
 _ROUND_TOP = (around(_O, W / 2 - 0.4 * M), around(_O, D / 2 - 0.4 * M))
 
-PIECES = {
+SEAT_PIECES = {
     "dining": Piece(
-        "free",
-        (1.3, 2.1),
-        (1.5, 1.75),
-        (0.72, 0.77),
-        ("furniture", "front", "support", "object"),
+        "free", (1.3, 2.1), (1.5, 1.75), (0.72, 0.77), ("furniture", "front", "support", "object"),
         (
-            box(0, *_DINING_TOP, (H - 0.04 * M, H)),
-            *legs(2, *_DINING_TOP, H - 0.04 * M, 0.06),
-            *_dining_chairs(),
+            box(0, *_DINING_TOP, (H - 0.04 * M, H)), *legs(2, *_DINING_TOP, H - 0.04 * M, 0.06), *_dining_chairs(),
             *_table_top()[:2],
         ),
     ),
     "round_dining": Piece(
-        "free",
-        (1.5, 1.9),
-        (1.5, 1.9),
-        (0.72, 0.77),
-        ("furniture", "front", "support", "object"),
+        "free", (1.5, 1.9), (1.5, 1.9), (0.72, 0.77), ("furniture", "front", "support", "object"),
         (
             cylinder(0, *_ROUND_TOP, (H - 0.04 * M, H)),
             cylinder(2, around(_O, 0.06), around(_O, 0.06), (_O, H - 0.04 * M)),
-            cylinder(2, around(_O, 0.28), around(_O, 0.28), (_O, 0.04 * M)),
-            *_table_top()[:2],
-            *(moved(p, _O, D / 2 - 0.25 * M) for p in _chair(1)),
-            *(moved(p, _O, -D / 2 + 0.25 * M) for p in _chair(-1)),
+            cylinder(2, around(_O, 0.28), around(_O, 0.28), (_O, 0.04 * M)), *_table_top()[:2],
+            *(move_part(p, _O, D / 2 - 0.25 * M) for p in _chair(1)),
+            *(move_part(p, _O, -D / 2 + 0.25 * M) for p in _chair(-1)),
         ),
     ),
     "coffee_table": Piece(
@@ -177,16 +166,9 @@ PIECES = {
     "armchair": Piece("free", (0.75, 0.95), (0.75, 0.95), (0.75, 1.0), ("soft", "pillow", "support"), _sofa_parts(1)),
     "chair": Piece("free", (0.42, 0.42), (0.42, 0.42), (0.9, 0.9), ("object", "front", "support"), _chair(1)),
     "pouf": Piece(
-        "free",
-        (0.4, 0.7),
-        (0.4, 0.7),
-        (0.35, 0.5),
-        ("soft", "pillow"),
-        (
-            cylinder(0, ACROSS, DEEP, (0.02 * M, 0.8 * H)),
-            ball(0, ACROSS, DEEP, (0.55 * H, 1.05 * H)),
-        ),
+        "free", (0.4, 0.7), (0.4, 0.7), (0.35, 0.5), ("soft", "pillow"),
+        (cylinder(0, ACROSS, DEEP, (0.02 * M, 0.8 * H)), ball(0, ACROSS, DEEP, (0.55 * H, 1.05 * H))),
     ),
     "bed": Piece("wall", (1.4, 1.9), (2.0, 2.2), (0.8, 1.3), ("furniture", "linen", "soft", "pillow"), _bed(2)),
     "single_bed": Piece("wall", (0.9, 1.1), (1.95, 2.1), (0.6, 1.1), ("furniture", "linen", "soft", "pillow"), _bed(1)),
-}
+}  # fmt: skip

@@ -16,8 +16,8 @@ from rein3d_jax.rooms.furniture.template import (
     box,
     cylinder,
     inset,
+    intervals,
     legs,
-    spread,
 )
 
 _O = 0 * M
@@ -39,8 +39,8 @@ def doors(
 ) -> tuple[Part, ...]:
     """Doors or drawers on the front, each with a bar for a handle."""
     parts = []
-    for x in spread(columns, *inset(ACROSS, 0.02)):
-        for z in spread(rows, low, high):
+    for x in intervals(columns, *inset(ACROSS, 0.02)):
+        for z in intervals(rows, low, high):
             parts.append(box(front, inset(x, 0.006), _FRONT, inset(z, 0.006), casts=False))
             middle, top = (x[0] + x[1]) / 2, z[1] - 0.06 * M
             if rows > 1:
@@ -61,14 +61,14 @@ def _case(boards: int) -> tuple[Part, ...]:
         box(0, (-W / 2, -W / 2 + thick), DEEP, (_O, H)),
         box(0, (W / 2 - thick, W / 2), DEEP, (_O, H)),
         box(0, ACROSS, (D / 2 - 0.01 * M, D / 2), (_O, H), 0.7),
-        *(box(0, ACROSS, DEEP, (z[0], z[0] + thick)) for z in spread(boards, 0.05 * M, H - 0.025 * M)),
+        *(box(0, ACROSS, DEEP, (z[0], z[0] + thick)) for z in intervals(boards, 0.05 * M, H - 0.025 * M)),
         box(0, ACROSS, DEEP, (H - thick, H)),
     )
 
 
 def _filled_shelf() -> tuple[Part, ...]:
     fill = []
-    for i, z in enumerate(spread(4, 0.05 * M, H - 0.025 * M)):
+    for i, z in enumerate(intervals(4, 0.05 * M, H - 0.025 * M)):
         on, high = z[0] + 0.025 * M, z[0] + 0.025 * M + 0.72 * (z[1] - z[0])
         cut = (0.1, 0.3, -0.05, 0.2)[i] * W
         deep = (-D / 2 + 0.03 * M, D / 2 - 0.02 * M)
@@ -102,67 +102,38 @@ def _desk() -> tuple[Part, ...]:
 _CABINET = (box(0, ACROSS, BODY, (0.06 * M, H)), *legs(2, ACROSS, DEEP, 0.06 * M, 0.05))
 _TEXTURES = ("furniture", "front", "support", "object")
 
-PIECES = {
+STORAGE_PIECES = {
     "cabinet": Piece(
-        "wall",
-        (0.8, 1.6),
-        (0.38, 0.5),
-        (0.7, 1.1),
-        _TEXTURES,
+        "wall", (0.8, 1.6), (0.38, 0.5), (0.7, 1.1), _TEXTURES,
         (*_CABINET, *doors(2, 3, 0.08 * M, H - 0.03 * M), *_on_top(3)),
     ),
     "tv_unit": Piece(
-        "wall",
-        (1.2, 2.0),
-        (0.36, 0.45),
-        (0.35, 0.55),
-        ("furniture", "front", "screen", "object"),
+        "wall", (1.2, 2.0), (0.36, 0.45), (0.35, 0.55), ("furniture", "front", "screen", "object"),
         (
-            *_CABINET,
-            *doors(3, 1, 0.08 * M, H - 0.03 * M),
-            *_television(),
+            *_CABINET, *doors(3, 1, 0.08 * M, H - 0.03 * M), *_television(),
             cylinder(3, around(0.44 * W, 0.05), around(_O, 0.05), (H, H + 0.2 * M), 0.5),
         ),
     ),
     "nightstand": Piece(
-        "wall",
-        (0.4, 0.55),
-        (0.36, 0.42),
-        (0.42, 0.6),
-        ("furniture", "front", "support", "lampshade"),
+        "wall", (0.4, 0.55), (0.36, 0.42), (0.42, 0.6), ("furniture", "front", "support", "lampshade"),
         (
-            *_CABINET,
-            *doors(1, 2, 0.08 * M, H - 0.03 * M),
+            *_CABINET, *doors(1, 2, 0.08 * M, H - 0.03 * M),
             cylinder(2, around(_O, 0.02), around(_O, 0.02), (H, H + 0.25 * M), 0.7),
             cylinder(3, around(_O, 0.11), around(_O, 0.11), (H + 0.22 * M, H + 0.4 * M), 0.7, False),
         ),
     ),
     "wardrobe": Piece(
-        "wall",
-        (1.0, 2.2),
-        (0.55, 0.65),
-        (1.9, 2.25),
-        _TEXTURES,
+        "wall", (1.0, 2.2), (0.55, 0.65), (1.9, 2.25), _TEXTURES,
         (box(0, ACROSS, BODY, (_O, H)), *doors(3, 1, 0.06 * M, H - 0.03 * M)),
     ),
     "shelf": Piece(
-        "wall",
-        (0.7, 1.4),
-        (0.26, 0.36),
-        (1.4, 2.1),
-        ("furniture", "books", "object", "object"),
+        "wall", (0.7, 1.4), (0.26, 0.36), (1.4, 2.1), ("furniture", "books", "object", "object"),
         (*_case(4), *_filled_shelf()),
     ),
     "open_shelf": Piece(
-        "wall",
-        (0.6, 1.6),
-        (0.26, 0.4),
-        (0.75, 1.3),
-        ("furniture", "books", "object", "object"),
+        "wall", (0.6, 1.6), (0.26, 0.4), (0.75, 1.3), ("furniture", "books", "object", "object"),
         (
-            *_case(2),
-            *_on_top(3),
-            box(1, (-0.44 * W, -0.05 * W), inset(DEEP, 0.02), (0.075 * M, 0.4 * H), 0.8),
+            *_case(2), *_on_top(3), box(1, (-0.44 * W, -0.05 * W), inset(DEEP, 0.02), (0.075 * M, 0.4 * H), 0.8),
             box(1, (0.05 * W, 0.42 * W), inset(DEEP, 0.02), (0.5 * H + 0.05 * M, 0.85 * H), 0.7),
             box(2, (0.1 * W, 0.4 * W), inset(DEEP, 0.04), (0.075 * M, 0.35 * H), 0.6),
         ),
@@ -170,4 +141,4 @@ PIECES = {
     "desk": Piece(
         "wall", (1.0, 1.6), (0.55, 0.75), (0.72, 0.76), ("furniture", "support", "screen", "object"), _desk()
     ),
-}
+}  # fmt: skip

@@ -10,8 +10,8 @@ import numpy as np
 
 W, D, H, M = np.eye(4)
 BOX, CYLINDER, ELLIPSOID = 0, 1, 2
-PARTS = 32  # a piece's most
-TEXTURES = 4  # a piece's most
+MAX_PARTS = 32  # of a piece
+MAX_TEXTURES = 4  # of a piece
 Bounds = tuple[np.ndarray, np.ndarray]
 Range = tuple[float, float]
 
@@ -35,7 +35,7 @@ class Part:
 @dataclass(frozen=True)
 class Piece:
     """A kind of furniture. Where it goes:
-    wall     its back at a wall, on the floor       free     anywhere on the floor, turned
+    wall     its back at a wall, on the floor       free     anywhere on the floor, at any yaw
     hung     its back at a wall, at `lift`          flat     anywhere on the floor, under everything
     ceiling  anywhere under the ceiling"""
 
@@ -64,7 +64,7 @@ def ball(texture: int, x: Bounds, y: Bounds, z: Bounds, chance: float = 1.0, cas
 
 
 def around(centre: np.ndarray, half: float | np.ndarray) -> Bounds:
-    """centre - half, centre + half; a number is metres."""
+    """Bounds centre - half, centre + half; a number is metres."""
     half = half * M if np.isscalar(half) else half
     return centre - half, centre + half
 
@@ -78,8 +78,8 @@ def legs(
     return tuple(box(texture, i, j, (0 * M, top), chance) for i in sides[0] for j in sides[1])
 
 
-def spread(count: int, low: np.ndarray, high: np.ndarray) -> list[Bounds]:
-    """`count` equal intervals between two bounds."""
+def intervals(count: int, low: np.ndarray, high: np.ndarray) -> list[Bounds]:
+    """Bounds of `count` equal intervals from `low` to `high`."""
     return [(low + (high - low) * (i / count), low + (high - low) * ((i + 1) / count)) for i in range(count)]
 
 
@@ -88,7 +88,6 @@ def inset(bounds: Bounds, by: float) -> Bounds:
     return bounds[0] + by * M, bounds[1] - by * M
 
 
-def moved(part: Part, x: np.ndarray, y: np.ndarray) -> Part:
-    """A part moved along the floor."""
-    shift = lambda bounds, by: (bounds[0] + by, bounds[1] + by)  # noqa: E731
-    return replace(part, x=shift(part.x, x), y=shift(part.y, y))
+def move_part(part: Part, x: np.ndarray, y: np.ndarray) -> Part:
+    """The part moved along the floor."""
+    return replace(part, x=(part.x[0] + x, part.x[1] + x), y=(part.y[0] + y, part.y[1] + y))

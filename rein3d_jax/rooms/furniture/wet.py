@@ -122,15 +122,11 @@ def _island() -> tuple[Part, ...]:
 
 _KITCHEN = ("front", "front", "stone", "metal")
 
-PIECES = {
+WET_PIECES = {
     "counter": Piece("wall", (1.8, 3.2), (0.6, 0.65), (0.86, 0.94), _KITCHEN, _counter(4)),
     "short_counter": Piece("wall", (0.9, 1.6), (0.6, 0.65), (0.86, 0.94), _KITCHEN, _counter(2)),
     "wall_cabinets": Piece(
-        "hung",
-        (1.2, 2.6),
-        (0.3, 0.36),
-        (0.55, 0.75),
-        ("front", "front", "metal"),
+        "hung", (1.2, 2.6), (0.3, 0.36), (0.55, 0.75), ("front", "front", "metal"),
         (box(0, ACROSS, BODY, (_O, H)), *doors(4, 1, _O, H)),
         (1.4, 1.5),
     ),
@@ -141,4 +137,4 @@ PIECES = {
     "vanity": Piece("wall", (0.7, 1.3), (0.45, 0.52), (0.78, 0.88), ("front", "ceramic", "stone", "metal"), _vanity()),
     "toilet": Piece("wall", (0.42, 0.42), (0.65, 0.72), (0.75, 0.85), ("ceramic", "metal"), _toilet()),
     "washer": Piece("wall", (0.6, 0.6), (0.58, 0.62), (0.84, 0.86), ("ceramic", "screen", "pillow"), _washer()),
-}
+}  # fmt: skip

@@ -17,8 +17,8 @@ def slab(origin: Vector, ray: Vector, half: Vector) -> tuple[jax.Array, jax.Arra
     enter, leave = -jnp.inf, jnp.inf
     for o, d, h in zip(origin, ray, half, strict=True):
         inverse = 1 / jnp.where(jnp.abs(d) < _PARALLEL, _PARALLEL, d)
-        middle, reach = -o * inverse, jnp.abs(inverse) * h
-        enter, leave = jnp.maximum(enter, middle - reach), jnp.minimum(leave, middle + reach)
+        middle, length = -o * inverse, jnp.abs(inverse) * h
+        enter, leave = jnp.maximum(enter, middle - length), jnp.minimum(leave, middle + length)
     return enter, leave
 
 
@@ -48,43 +48,43 @@ def meet_cylinder(origin: Vector, ray: Vector, half: Vector) -> jax.Array:
     closest = -(o[0] * d[0] + o[1] * d[1]) / square
     x, y = o[0] + closest * d[0], o[1] + closest * d[1]
     inside = 1 - x * x - y * y
-    reach = jnp.sqrt(jnp.maximum(inside, 0) / square)
+    length = jnp.sqrt(jnp.maximum(inside, 0) / square)
     inverse = 1 / jnp.where(jnp.abs(d[2]) < _PARALLEL, _PARALLEL, d[2])
-    enter = jnp.maximum(closest - reach, -o[2] * inverse - jnp.abs(inverse))
-    leave = jnp.minimum(closest + reach, -o[2] * inverse + jnp.abs(inverse))
+    enter = jnp.maximum(closest - length, -o[2] * inverse - jnp.abs(inverse))
+    leave = jnp.minimum(closest + length, -o[2] * inverse + jnp.abs(inverse))
     return jnp.where((inside > 0) & (enter <= leave) & (enter > 0), enter, jnp.inf)
 
 
-def hide_by_box(origin: Vector, ray: Vector, half: Vector, reach: jax.Array, width: jax.Array) -> jax.Array:
-    """Share of a lamp that the box hides; the lamp is `reach` metres along the ray and `width` = its radius / reach.
+def hide_by_box(origin: Vector, ray: Vector, half: Vector, distance: jax.Array, width: jax.Array) -> jax.Array:
+    """Share of a lamp that the box hides; the lamp is `distance` metres away, `width` its radius / distance.
 
     The ray is judged where it comes nearest to the box (in the middle of its slabs' intervals): by how deep it runs
     inside, or how far outside, relative to the cone from the point to the lamp. Hard at contact, soft far away.
     """
     enter, leave = slab(origin, ray, half)
-    middle = 0.5 * (jnp.clip(enter, 0, reach) + jnp.clip(leave, 0, reach))
+    middle = 0.5 * (jnp.clip(enter, 0, distance) + jnp.clip(leave, 0, distance))
     outside = -jnp.inf
     for o, d, h in zip(origin, ray, half, strict=True):
         outside = jnp.maximum(outside, jnp.abs(o + middle * d) - h)
     return _share(outside, middle, width)
 
 
-def hide_by_ellipsoid(origin: Vector, ray: Vector, half: Vector, reach: jax.Array, width: jax.Array) -> jax.Array:
+def hide_by_ellipsoid(origin: Vector, ray: Vector, half: Vector, distance: jax.Array, width: jax.Array) -> jax.Array:
     """As hide_by_box, judged at the closest approach of the scaled ray."""
     o, d = _scaled(origin, half), _scaled(ray, half)
-    middle = jnp.clip(-dot(o, d) / dot(d, d), 0, reach)
+    middle = jnp.clip(-dot(o, d) / dot(d, d), 0, distance)
     q = tuple(a + middle * b for a, b in zip(o, d, strict=True))
     size = jnp.minimum(jnp.minimum(half[0], half[1]), half[2])
     return _share((jnp.sqrt(dot(q, q)) - 1) * size, middle, width)
 
 
-def hide_by_cylinder(origin: Vector, ray: Vector, half: Vector, reach: jax.Array, width: jax.Array) -> jax.Array:
+def hide_by_cylinder(origin: Vector, ray: Vector, half: Vector, distance: jax.Array, width: jax.Array) -> jax.Array:
     """As hide_by_box, judged where the ray comes nearest to the axis between the caps."""
     o, d = _scaled(origin, half), _scaled(ray, half)
     closest = -(o[0] * d[0] + o[1] * d[1]) / jnp.maximum(d[0] * d[0] + d[1] * d[1], _PARALLEL)
     inverse = 1 / jnp.where(jnp.abs(d[2]) < _PARALLEL, _PARALLEL, d[2])
     below, above = -o[2] * inverse - jnp.abs(inverse), -o[2] * inverse + jnp.abs(inverse)
-    middle = jnp.clip(jnp.clip(closest, below, above), 0, reach)
+    middle = jnp.clip(jnp.clip(closest, below, above), 0, distance)
     x, y, z = (a + middle * b for a, b in zip(o, d, strict=True))
     round_side = (jnp.sqrt(x * x + y * y) - 1) * jnp.minimum(half[0], half[1])
     return _share(jnp.maximum(round_side, (jnp.abs(z) - 1) * half[2]), middle, width)

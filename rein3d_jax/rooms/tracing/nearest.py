@@ -8,25 +8,22 @@ from jax import lax
 
 from rein3d_jax.rooms.model import Openings, Room, Solids
 from rein3d_jax.rooms.tracing.intersect import meet_box, meet_cylinder, meet_ellipsoid, slab
-from rein3d_jax.rooms.tracing.vectors import Vector, scale, split, subtract, turn_right
+from rein3d_jax.rooms.tracing.vectors import Vector, components, rotate_right, scale, subtract
 
-FACES = 6  # floor, ceiling, walls at +x, +y, -x, -y
+SHELL_FACES = 6  # floor, ceiling, walls at +x, +y, -x, -y
 # Solids handled in one pass over the pixels: rays are read from memory once for all of them. Measured on 2 cores.
 _AT_A_TIME = 8
 
 
 def over_solids(solids: Solids, count: jax.Array, carry, visit: Callable):
-    """carry = visit(carry, solid, index) for the first `count` solids, and perhaps a few more; `solid` is a row of
-    Solids."""
+    """The last carry = visit(carry, solid, index) of the first `count` solids, and perhaps a few more; `solid` is a row
+    of Solids."""
     capacity = solids.half.shape[0]
     assert capacity % _AT_A_TIME == 0, f"a capacity of {capacity} is no multiple of {_AT_A_TIME}"
 
     def some(block, carry):
         start = block * _AT_A_TIME
-        rows = jax.tree.map(
-            lambda x: lax.dynamic_slice_in_dim(x, start, _AT_A_TIME) if x.ndim else x,
-            solids,
-        )
+        rows = jax.tree.map(lambda x: lax.dynamic_slice_in_dim(x, start, _AT_A_TIME) if x.ndim else x, solids)
         for i in range(_AT_A_TIME):
             carry = visit(carry, jax.tree.map(lambda x, i=i: x[i] if x.ndim else x, rows), start + i)
         return carry
@@ -35,19 +32,20 @@ def over_solids(solids: Solids, count: jax.Array, carry, visit: Callable):
 
 
 def into(solid: Solids, origin: Vector, ray: Vector) -> tuple[Vector, Vector, Vector]:
-    """(origin, ray, half) in the axes of a solid."""
-    turn = split_turn(solid.turn)
-    return turn_right(subtract(origin, split(solid.centre)), turn), turn_right(ray, turn), split(solid.half)
+    """Origin and ray in the axes of a solid, and its half size."""
+    heading = cos_sin(solid.heading)
+    start = rotate_right(subtract(origin, components(solid.centre)), heading)
+    return start, rotate_right(ray, heading), components(solid.half)
 
 
-def split_turn(turn: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """(..., 2) -> cosine, sine."""
-    return turn[..., 0], turn[..., 1]
+def cos_sin(heading: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Cosine and sine (...) of headings (..., 2)."""
+    return heading[..., 0], heading[..., 1]
 
 
 def families(room: Room) -> tuple[tuple[Solids, int], ...]:
     """Boxes, cylinders and ellipsoids, each with the surface index of its first solid."""
-    boxes = FACES + room.openings.half.shape[0]
+    boxes = SHELL_FACES + room.openings.half.shape[0]
     cylinders = boxes + room.boxes.half.shape[0]
     ellipsoids = cylinders + room.cylinders.half.shape[0]
     return (room.boxes, boxes), (room.cylinders, cylinders), (room.ellipsoids, ellipsoids)
@@ -84,12 +82,12 @@ def _leave_shell(room: Room, origin: Vector, ray: Vector) -> tuple[jax.Array, ja
 def _enter_opening(carry, openings: Openings, index: int, origin: Vector, ray: Vector):
     """A ray that meets the shell inside the recess's box goes on to the far side of the box."""
     distance, surface = carry
-    moved = subtract(origin, split(openings.centre[index]))
-    enter, leave = slab(moved, ray, split(openings.half[index]))
-    through = (enter < distance) & (distance < leave) & (surface < FACES)
-    return jnp.where(through, leave, distance), jnp.where(through, FACES + index, surface)
+    moved = subtract(origin, components(openings.centre[index]))
+    enter, leave = slab(moved, ray, components(openings.half[index]))
+    through = (enter < distance) & (distance < leave) & (surface < SHELL_FACES)
+    return jnp.where(through, leave, distance), jnp.where(through, SHELL_FACES + index, surface)
 
 
 def point_at(origin: Vector, ray: Vector, distance: jax.Array) -> Vector:
-    """origin + distance ray."""
+    """Point origin + distance ray."""
     return tuple(o + d for o, d in zip(origin, scale(ray, distance), strict=True))

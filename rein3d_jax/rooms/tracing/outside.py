@@ -5,7 +5,7 @@ import jax.numpy as jnp
 
 from rein3d_jax.rooms.model import Outside
 from rein3d_jax.rooms.tracing.pattern import fractal_noise
-from rein3d_jax.rooms.tracing.vectors import Vector, split
+from rein3d_jax.rooms.tracing.vectors import Vector, components
 
 _EDGE = 0.04  # of the tangent: the skyline's softness, about a pixel of a 64-row panorama
 
@@ -22,7 +22,7 @@ def outside(view: Outside, ray: Vector, pitch: float, seed: jax.Array) -> Vector
     sky = jnp.clip((height - skyline) / _EDGE + 0.5, 0, 1)
     ground = jnp.clip((-0.12 - height) / _EDGE + 0.5, 0, 1)
     zenith = jnp.clip(height * 1.2, 0, 1)
-    rows = [split(row) for row in view.colours]
+    rows = [components(row) for row in view.colours]
     return tuple(
         view.brightness * (_mix(_mix(c * (1 + 0.7 * fine), d, ground), _mix(b, a, zenith) * (1 + 0.12 * fine), sky))
         for a, b, c, d in zip(*rows, strict=True)

@@ -13,7 +13,7 @@ _THIN = 1e-4  # metres: a footprint no texture is finer than
 
 
 def hashed(x: jax.Array, y: jax.Array, seed: jax.Array) -> jax.Array:
-    """Integers -> noise in [0, 1), the same for the same integers. x, y whole numbers as float32, seed uint32."""
+    """Noise in [0, 1), the same for the same integers: x, y whole numbers as float32, seed uint32."""
     h = x.astype(jnp.int32).astype(jnp.uint32) * jnp.uint32(0x8DA6B343)
     h = (h ^ (y.astype(jnp.int32).astype(jnp.uint32) * jnp.uint32(0xD8163841))) + seed
     h = (h ^ (h >> 15)) * jnp.uint32(0x2C1B3C6D)
@@ -57,8 +57,8 @@ def joints(x: jax.Array, period: jax.Array, width: jax.Array, footprint: jax.Arr
     return jnp.clip((integral(start + footprint) - integral(start)) / footprint, 0, 1)
 
 
-def walk_ramp(ramp: tuple[Vector, Vector, Vector], position: jax.Array) -> Vector:
-    """Position in [0, 1] -> linear interpolation through three colours."""
+def ramp_colour(ramp: tuple[Vector, Vector, Vector], position: jax.Array) -> Vector:
+    """Colour at `position` in [0, 1] of a ramp through three colours, linearly interpolated."""
     low, high = jnp.clip(2 * position, 0, 1), jnp.clip(2 * position - 1, 0, 1)
     return tuple(a + (b - a) * low + (c - b) * high for a, b, c in zip(*ramp, strict=True))
 
@@ -78,7 +78,7 @@ def reflectance(texture: dict, u: jax.Array, v: jax.Array, du: jax.Array, dv: ja
     grain_u, grain_v = texture["grain"]
     x, y = u / grain_u + 61.0 * tone, v / grain_v + 37.0 * tone
     noise = fractal_noise(x, y, jnp.maximum(du / grain_u, dv / grain_v), texture["detail"], seed)
-    colour = walk_ramp(texture["ramp"], 0.5 + 0.5 * texture["contrast"] * noise)
+    colour = ramp_colour(texture["ramp"], 0.5 + 0.5 * texture["contrast"] * noise)
     across = 1 - joints(moved, cell_u, texture["joint"], du)
     joint = 1 - across * (1 - joints(upwards, cell_v, texture["joint"], dv))
     cells = 1 + texture["variation"] * apart * (2 * tone - 1)

@@ -5,27 +5,33 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from rein3d_jax.geometry.colour import srgb_from_linear
 from rein3d_jax.geometry.sphere import pixel_rays, world_from_camera_axes
-from rein3d_jax.rooms.model import Room, View
-from rein3d_jax.rooms.tracing.nearest import FACES, nearest, point_at
+from rein3d_jax.rooms.model import Room, TracedPanorama
+from rein3d_jax.rooms.tracing.nearest import SHELL_FACES
 from rein3d_jax.rooms.tracing.outside import outside
 from rein3d_jax.rooms.tracing.pattern import joints, reflectance
-from rein3d_jax.rooms.tracing.shade import footprint, gather_texture, irradiance, own_footprint
-from rein3d_jax.rooms.tracing.surface import Hits, Table, describe, surface_coordinates, surface_table
-from rein3d_jax.rooms.tracing.tone import display
-from rein3d_jax.rooms.tracing.vectors import Vector, choose, scale, split, turn_left
+from rein3d_jax.rooms.tracing.shade import gather_texture, irradiance, pixel_footprint
+from rein3d_jax.rooms.tracing.surface import (
+    SurfaceHits,
+    SurfaceTable,
+    meet_surfaces,
+    surface_coordinates,
+    surface_table,
+)
+from rein3d_jax.rooms.tracing.vectors import Vector, choose, components, rotate_left, rotate_right, scale
 
 _FRAME = 0.06  # metres: the bars between panes and panels
 _BAR_SHADE = 0.75  # of a door's panels against its bars
 
 
-def trace(room: Room, world_from_camera: jax.Array, height: int, *, samples: int = 1) -> View:
+def trace(room: Room, world_from_camera: jax.Array, height: int, *, samples: int = 1) -> TracedPanorama:
     """Equirectangular panoramas of height x 2 height pixels from poses (..., 4, 4), all inside the room's free space.
 
     `samples` x `samples` rays a pixel, averaged as displayed, smooth the silhouettes; textures are smooth already.
     Distance, normal and object id are those of the ray through the pixel's centre, whatever `samples` is; the distance
-    is 0 on the windows of a room whose windows are open. Pure; works
-    under jit (height and samples static) and vmap, on any platform. Every pose costs the same.
+    is 0 on the windows of a room whose windows are open. Pure; works under jit (height and samples static) and vmap, on
+    any platform. Every pose costs the same.
     """
     assert world_from_camera.shape[-2:] == (4, 4), world_from_camera.shape
     assert samples >= 1, samples
@@ -36,54 +42,55 @@ def trace(room: Room, world_from_camera: jax.Array, height: int, *, samples: int
     colours, distance, normal, objects = lax.map(
         lambda pose: _frame(room, table, pose, height, samples), world_from_camera.reshape(-1, 4, 4)
     )
-    view = View(jnp.stack(colours, axis=-1), distance, jnp.stack(normal, axis=-1), objects)
+    view = TracedPanorama(jnp.stack(colours, axis=-1), distance, jnp.stack(normal, axis=-1), objects)
     return jax.tree.map(lambda x: x.reshape(*leading, *x.shape[1:]), view)
 
 
-def _frame(room: Room, table: Table, pose: jax.Array, height: int, samples: int):
+def _frame(room: Room, table: SurfaceTable, pose: jax.Array, height: int, samples: int):
     """(rgb as a vector, distance, normal as a vector, object id), each (h, 2 h)."""
     origin, ray = _rays(room, pose, height)
-    distance, hits = _meet(room, table, origin, ray)
-    turned = turn_left(hits.normal, (jnp.cos(room.yaw), jnp.sin(room.yaw)))
+    hits = meet_surfaces(room, table, origin, ray)
+    normal = rotate_left(hits.normal, (jnp.cos(room.yaw), jnp.sin(room.yaw)))
     if samples == 1:
-        colour = _colour(room, table, hits, ray, distance, pose, height)
+        colour = _colour(room, table, hits, ray, pose, height)
     else:
         colour = _oversampled(room, table, pose, height, samples)
     seen_through = room.open_windows & _is_window(room, hits) & _on_leaf(room, hits)
-    return colour, jnp.where(seen_through, 0.0, distance), turned, table.object[hits.index].astype(jnp.int32)
+    return colour, jnp.where(seen_through, 0.0, hits.distance), normal, table.object[hits.index].astype(jnp.int32)
 
 
-def _oversampled(room: Room, table: Table, pose: jax.Array, height: int, samples: int) -> Vector:
+def _oversampled(room: Room, table: SurfaceTable, pose: jax.Array, height: int, samples: int) -> Vector:
     fine = height * samples
     origin, ray = _rays(room, pose, fine)
-    distance, hits = _meet(room, table, origin, ray)
-    colour = _colour(room, table, hits, ray, distance, pose, fine)
+    hits = meet_surfaces(room, table, origin, ray)
+    colour = _colour(room, table, hits, ray, pose, fine)
     return tuple(x.reshape(height, samples, 2 * height, samples).mean((1, 3)) for x in colour)
 
 
 def _rays(room: Room, pose: jax.Array, height: int) -> tuple[Vector, Vector]:
     """Origin and unit rays (h, 2 h), in the room's axes."""
     position = jnp.matmul(pose[:3, 3], _room_from_world(room).T, precision="highest")
-    return split(position), _turned(room, pose, split(pixel_rays(height, 2 * height)))
+    return components(position), _in_room(room, pose, components(pixel_rays(height, 2 * height)))
 
 
 def _steps(room: Room, pose: jax.Array, height: int) -> tuple[Vector, Vector]:
     """How the rays change (h, 2 h) from one pixel to the next, to the right and down, in the room's axes."""
-    x, y, z = split(pixel_rays(height, 2 * height))
+    x, y, z = components(pixel_rays(height, 2 * height))
     pitch = jnp.pi / height
     flat = jnp.hypot(x, y)
     right, down = (
         (pitch * y, -pitch * x, jnp.zeros_like(z)),
         (pitch * x * z / flat, pitch * y * z / flat, -pitch * flat),
     )
-    return _turned(room, pose, right), _turned(room, pose, down)
+    return _in_room(room, pose, right), _in_room(room, pose, down)
 
 
-def _turned(room: Room, pose: jax.Array, camera: Vector) -> Vector:
-    """Vectors (h, w) in an unturned panorama's axes -> the same in the room's axes."""
-    turn = jnp.matmul(pose[:3, :3], world_from_camera_axes().T, precision="highest")
-    turn = jnp.matmul(_room_from_world(room), turn, precision="highest")
-    return tuple(turn[i, 0] * camera[0] + turn[i, 1] * camera[1] + turn[i, 2] * camera[2] for i in range(3))
+def _in_room(room: Room, pose: jax.Array, camera: Vector) -> Vector:
+    """Vectors (h, w) in the axes of a panorama that looks along its +X, in the room's axes."""
+    rotation = jnp.matmul(pose[:3, :3], world_from_camera_axes().T, precision="highest")
+    rotation = jnp.matmul(_room_from_world(room), rotation, precision="highest")
+    rows = [[rotation[i, j] for j in range(3)] for i in range(3)]
+    return tuple(x * camera[0] + y * camera[1] + z * camera[2] for x, y, z in rows)
 
 
 def _room_from_world(room: Room) -> jax.Array:
@@ -92,15 +99,10 @@ def _room_from_world(room: Room) -> jax.Array:
     return jnp.stack([jnp.stack(row) for row in rows])
 
 
-def _meet(room: Room, table: Table, origin: Vector, ray: Vector) -> tuple[jax.Array, Hits]:
-    distance, index = nearest(room, origin, ray)
-    return distance, describe(room, table, point_at(origin, ray, distance), ray, index)
-
-
-def _colour(room: Room, table: Table, hits: Hits, ray: Vector, distance, pose, height: int) -> Vector:
+def _colour(room: Room, table: SurfaceTable, hits: SurfaceHits, ray: Vector, pose: jax.Array, height: int) -> Vector:
     """Display values (h, w)."""
     steps = _steps(room, pose, height)
-    moves = [own_footprint(hits, footprint(ray, step, distance, hits.normal)) for step in steps]
+    moves = [rotate_right(pixel_footprint(ray, step, hits.distance, hits.normal), hits.heading) for step in steps]
     (du, dv), (eu, ev) = (surface_coordinates(hits.face, move) for move in moves)
     du, dv = jnp.sqrt(du * du + eu * eu), jnp.sqrt(dv * dv + ev * ev)
     u, v = surface_coordinates(hits.face, hits.local)
@@ -114,24 +116,29 @@ def _colour(room: Room, table: Table, hits: Hits, ray: Vector, distance, pose, h
     seen = tuple(a * e + a * glow for a, e in zip(albedo, light, strict=True))
     sky = scale(outside(room.outside, ray, jnp.pi / height, room.seed), 1 / room.exposure)
     seen = choose(_is_window(room, hits) & (pane > 0), _blend(sky, seen, bars), seen)
-    return display(seen, room.exposure, room.gamma)
+    return _display(seen, room.exposure, room.gamma)
 
 
-def _opening_index(room: Room, hits: Hits) -> jax.Array:
-    return jnp.clip(hits.index - FACES, 0, room.openings.wall.shape[0] - 1)
+def _display(light: Vector, exposure: jax.Array, gamma: jax.Array) -> Vector:
+    """sRGB in [0, 1] of linear light: 1 - exp(-exposure light), which never clips, raised to `gamma` (contrast)."""
+    return tuple(srgb_from_linear((1 - jnp.exp(-exposure * jnp.maximum(x, 0))) ** gamma) for x in light)
 
 
-def _on_leaf(room: Room, hits: Hits) -> jax.Array:
+def _opening_index(room: Room, hits: SurfaceHits) -> jax.Array:
+    return jnp.clip(hits.index - SHELL_FACES, 0, room.openings.wall.shape[0] - 1)
+
+
+def _on_leaf(room: Room, hits: SurfaceHits) -> jax.Array:
     """On the window or door at the end of a recess, not on the recess's sides."""
-    in_recess = (hits.index >= FACES) & (hits.index < FACES + room.openings.wall.shape[0])
+    in_recess = (hits.index >= SHELL_FACES) & (hits.index < SHELL_FACES + room.openings.wall.shape[0])
     return in_recess & (hits.face == room.openings.wall[_opening_index(room, hits)] % 2)
 
 
-def _is_window(room: Room, hits: Hits) -> jax.Array:
+def _is_window(room: Room, hits: SurfaceHits) -> jax.Array:
     return room.openings.window[_opening_index(room, hits)] > 0.5
 
 
-def _pane(room: Room, hits: Hits, du, dv) -> tuple[jax.Array, jax.Array]:
+def _pane(room: Room, hits: SurfaceHits, du, dv) -> tuple[jax.Array, jax.Array]:
     """(1 on the leaf at the end of a recess, else 0; share of it that is frame and bars)."""
     opening, pane = _opening_index(room, hits), _on_leaf(room, hits)
     wide = jnp.where(hits.face == 0, hits.half[1], hits.half[0])
