@@ -6,10 +6,10 @@ import jax.numpy as jnp
 from flax import struct
 
 from rein3d_jax.geometry.resample import sample_sphere
-from rein3d_jax.geometry.sphere import pixels_from_rays, world_from_camera_axes
+from rein3d_jax.geometry.sphere import pixels_from_rays, world_from_panorama
 
 TRUNCATION = 4.0  # voxels
-SAME_SURFACE = 0.02  # relative; the means of d and of 1/d of four pixels agree on one surface only
+_SAME_SURFACE = 0.02  # relative; the means of d and of 1/d of four pixels agree on one surface only
 
 
 @struct.dataclass
@@ -48,17 +48,17 @@ def _fuse(field: Field, rgb: jax.Array, distance: jax.Array, world_from_camera: 
     is of OpenCV axes."""
     inverse = jnp.where(distance > 0, 1 / jnp.where(distance > 0, distance, 1.0), 0.0)
     image = jnp.concatenate([jnp.stack([distance, inverse], axis=-1), rgb], axis=-1)
-    turn = jnp.matmul(world_from_camera[:3, :3], world_from_camera_axes().T, precision="highest")
+    rotation = world_from_panorama(world_from_camera)
     _, y, z = (field.low[axis] + jnp.arange(size) * field.voxel for axis, size in enumerate(field.sums.shape[:3]))
 
     def slab(carried):  # one x at a time: a room's whole grid would take gigabytes
         index, sums = carried
         x = jnp.broadcast_to(field.low[0] + index * field.voxel, (y.size, z.size))
         offset = jnp.stack([x, *jnp.meshgrid(y, z, indexing="ij")], axis=-1) - world_from_camera[:3, 3]
-        rays = jnp.matmul(offset, turn, precision="highest")
+        rays = jnp.matmul(offset, rotation, precision="highest")
         shown = sample_sphere(image, *pixels_from_rays(rays, *distance.shape))
         signed = (shown[..., 0] - jnp.linalg.norm(offset, axis=-1)) / field.voxel
-        sure = (jnp.abs(shown[..., 0] * shown[..., 1] - 1) < SAME_SURFACE) & (signed > -TRUNCATION)
+        sure = (jnp.abs(shown[..., 0] * shown[..., 1] - 1) < _SAME_SURFACE) & (signed > -TRUNCATION)
         near = (sure & (signed < TRUNCATION)).astype(jnp.float32)[..., None]
         weight = sure.astype(jnp.float32)[..., None]
         value = jnp.clip(signed, -TRUNCATION, TRUNCATION)[..., None]

@@ -44,10 +44,15 @@ def world_from_camera_axes() -> jax.Array:
     return jnp.asarray(WORLD_FROM_CAMERA_AXES, jnp.float32)
 
 
+def world_from_panorama(world_from_camera: jax.Array) -> jax.Array:
+    """(3, 3): the rotation to the world from the axes of `pixel_rays`, of an equirectangular camera at (4, 4)."""
+    return jnp.matmul(world_from_camera[:3, :3], world_from_camera_axes().T, precision=jax.lax.Precision.HIGHEST)
+
+
 def rays_of_pose(world_from_camera: jax.Array, height: int, width: int) -> jax.Array:
     """(height, width, 3) unit rays, in the world, of an equirectangular camera at `world_from_camera` (4, 4)."""
-    turn = jnp.matmul(world_from_camera[:3, :3], world_from_camera_axes().T, precision=jax.lax.Precision.HIGHEST)
-    return jnp.matmul(pixel_rays(height, width), turn.T, precision=jax.lax.Precision.HIGHEST)
+    rotation = world_from_panorama(world_from_camera)
+    return jnp.matmul(pixel_rays(height, width), rotation.T, precision=jax.lax.Precision.HIGHEST)
 
 
 def rays_of_pose64(world_from_camera: np.ndarray, height: int) -> np.ndarray:

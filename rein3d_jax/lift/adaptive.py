@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.rotations import quats_from_matrix
 from rein3d_jax.geometry.safe import safe_norm
-from rein3d_jax.geometry.sphere import pixel_rays, world_from_camera_axes
+from rein3d_jax.geometry.sphere import pixel_rays, world_from_panorama
 from rein3d_jax.geometry.spherical_harmonics import sh_from_rgb
 from rein3d_jax.lift.edges import snap_edges
 from rein3d_jax.lift.leaf_cost import largest_side, leaf_costs
@@ -28,15 +28,13 @@ from rein3d_jax.scene import Gaussians, Panorama
 def capacity_of(height: int, width: int, config: LiftConfig) -> int:
     """Gaussians that `lift_adaptively` gives at most. Raises InputError where even the largest leaves are more."""
     capacity = math.floor(config.share * height * width)
-    rows, columns = (largest_side(pixels, config.largest) for pixels in (height, width))
-    least = height * width // (rows * columns)
-    if capacity < least:
+    rows, columns = (largest_side(pixels, config.max_leaf_side) for pixels in (height, width))
+    fewest = height * width // (rows * columns)
+    if capacity < fewest:
         raise InputError(
             f"lift.share {config.share} is {capacity:_} Gaussians, but the largest leaves, of {rows}x{columns} pixels, "
-            f"are {least:_}; raise lift.share or lift.largest"
+            f"are {fewest:_}; raise lift.share or lift.max_leaf_side"
         )
-    if config.stride != 1:
-        raise InputError(f"lift.share {config.share} chooses which pixels to join: set lift.stride = 1")
     return capacity
 
 
@@ -47,8 +45,8 @@ def lift_adaptively(
     whose distance is known. With share 1, `lift`'s own: one for each pixel.
 
     `world_from_camera` (4, 4) as in `lift`. Raises InputError where the share is too small for leaves of
-    config.largest, and where a stride is asked for as well. Pure; compiled piece by piece where called outside jit (as
-    one program it works as well, but XLA fuses the leaves of all sizes into each other: minutes of compiling).
+    config.max_leaf_side. Pure; compiled piece by piece where called outside jit (as one program it works as well, but
+    XLA fuses the leaves of all sizes into each other: minutes of compiling).
     """
     if config.share >= 1:
         return lift(panorama, world_from_camera, select, config=config)
@@ -56,7 +54,7 @@ def lift_adaptively(
     distance, known = _prepared(panorama, config)
     wanted = known & select
     leaves = partition(leaf_costs(panorama.rgb, distance, wanted, config=config), wanted, capacity)
-    return _gaussians_of(leaves, panorama.rgb, distance, known, world_from_camera, capacity, config)
+    return _gaussians_of(leaves, panorama.rgb, distance, known, world_from_camera, config)
 
 
 @partial(jax.jit, static_argnums=1)
@@ -69,9 +67,10 @@ def _prepared(panorama: Panorama, config: LiftConfig) -> tuple[jax.Array, jax.Ar
     return distance, known
 
 
-@partial(jax.jit, static_argnums=(5, 6))
-def _gaussians_of(leaves: Leaves, rgb, distance, known, world_from_camera, capacity: int, config) -> Gaussians:
+@partial(jax.jit, static_argnums=5)
+def _gaussians_of(leaves: Leaves, rgb, distance, known, world_from_camera, config: LiftConfig) -> Gaussians:
     height, width = distance.shape
+    capacity = capacity_of(height, width, config)
     mean, alive = _means(leaves, capacity)
     slope = slopes(distance, known)
     slope *= jnp.minimum(1.0, config.steepest / jnp.maximum(safe_norm(slope, keepdims=True), 1e-6))
@@ -80,11 +79,11 @@ def _gaussians_of(leaves: Leaves, rgb, distance, known, world_from_camera, capac
     middle = jnp.where(alive[:, None], ray / jnp.where(alive, inverse, 1.0)[:, None], jnp.array([1.0, 0.0, 0.0]))
     sides = jnp.where(alive[:, None], mean(leaves.sides.astype(jnp.float32)), 1.0)
     axes, scales = _shape(middle, mean(slope), sides, jnp.pi / height, config)
-    turn = jnp.matmul(world_from_camera[:3, :3], world_from_camera_axes().T, precision=jax.lax.Precision.HIGHEST)
+    rotation = world_from_panorama(world_from_camera)
     return Gaussians(
-        means=jnp.matmul(middle, turn.T, precision=jax.lax.Precision.HIGHEST) + world_from_camera[:3, 3],
+        means=jnp.matmul(middle, rotation.T, precision=jax.lax.Precision.HIGHEST) + world_from_camera[:3, 3],
         log_scales=jnp.log(scales),
-        quats=quats_from_matrix(jnp.matmul(turn, axes, precision=jax.lax.Precision.HIGHEST)),
+        quats=quats_from_matrix(jnp.matmul(rotation, axes, precision=jax.lax.Precision.HIGHEST)),
         opacity_logits=jnp.full(capacity, jnp.log(config.opacity / (1 - config.opacity))),
         sh=sh_from_rgb(colour[:, None]),
         alive=alive,
@@ -121,9 +120,9 @@ def _shape(middle: jax.Array, slope: jax.Array, sides: jax.Array, pitch: float, 
     along = stretch**2 * (way[:, 0] ** 2 * right + way[:, 1] ** 2 * down)
     beside = way[:, 1] ** 2 * right + way[:, 0] ** 2 * down
     mixed = stretch * way[:, 0] * way[:, 1] * (right - down)
-    turned, sigmas = _ellipse(along, beside, mixed)
+    rotated, sigmas = _ellipse(along, beside, mixed)
     thin = config.thickness * jnp.sqrt(jnp.minimum(down, right))
-    return jnp.concatenate([axes[..., :2] @ turned, axes[..., 2:]], axis=-1), jnp.stack([*sigmas, thin], axis=-1)
+    return jnp.concatenate([axes[..., :2] @ rotated, axes[..., 2:]], axis=-1), jnp.stack([*sigmas, thin], axis=-1)
 
 
 def _ellipse(xx: jax.Array, yy: jax.Array, xy: jax.Array):
@@ -132,5 +131,5 @@ def _ellipse(xx: jax.Array, yy: jax.Array, xy: jax.Array):
     spread, middle = safe_norm(lean), (xx + yy) / 2
     angle = jnp.where(spread > 1e-6 * middle, jnp.arctan2(xy, lean[:, 0]) / 2, 0.0)
     cos, sin = jnp.cos(angle), jnp.sin(angle)
-    turned = jnp.stack([jnp.stack([cos, -sin], axis=-1), jnp.stack([sin, cos], axis=-1)], axis=-2)
-    return turned, (jnp.sqrt(middle + spread), jnp.sqrt(jnp.maximum(middle - spread, 1e-6 * middle)))
+    rotation = jnp.stack([jnp.stack([cos, -sin], axis=-1), jnp.stack([sin, cos], axis=-1)], axis=-2)
+    return rotation, (jnp.sqrt(middle + spread), jnp.sqrt(jnp.maximum(middle - spread, 1e-6 * middle)))

@@ -15,7 +15,7 @@ def with_capacity(gaussians: Gaussians, capacity: int) -> Gaussians:
     count = gaussians.alive.shape[0]
     capacity = capacity or 2 * count
     if capacity < count:
-        raise InputError(f"lift.capacity {capacity:_} < {count:_} pixels; raise it or double lift.stride")
+        raise InputError(f"lift.capacity {capacity:_} < {count:_} pixels; raise it or lower lift.share")
     grow = capacity - count
     padded = jax.tree.map(lambda x: jnp.pad(x, [(0, grow)] + [(0, 0)] * (x.ndim - 1)), gaussians)
     return padded.replace(quats=padded.quats.at[capacity - grow :, 0].set(1.0))

@@ -16,7 +16,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-SHARP = 0.1  # of all the climb: rendered maps of eight furnished rooms have 0.25 to 0.55 in single links
+_SHARP = 0.1  # of all the climb: rendered maps of eight furnished rooms have 0.25 to 0.55 in single links
 
 
 def _opening(x: jax.Array, length: int) -> jax.Array:
@@ -59,7 +59,7 @@ def _climb_by_width(inverse: jax.Array, excess: jax.Array, ramp: int, step: floa
 def _widest(climb: jax.Array) -> jax.Array:
     """Links of the widest peak that is a ramp, given `_climb_by_width`."""
     median = jnp.argmax(jnp.cumsum(climb) >= jnp.sum(climb) / 2)
-    return jnp.where(climb[1] > SHARP * jnp.sum(climb), 0.0, 1.5 * median)
+    return jnp.where(climb[1] > _SHARP * jnp.sum(climb), 0.0, 1.5 * median)
 
 
 def _snap_circles(inverse: jax.Array, valid: jax.Array, ramp: int, step: float, slope: float) -> jax.Array:

@@ -9,21 +9,21 @@ import jax.numpy as jnp
 from rein3d_jax.geometry.resample import pad_sphere
 from rein3d_jax.geometry.sphere import latitudes
 from rein3d_jax.lift.lift import LiftConfig
-from rein3d_jax.lift.moments import halves, of_pixels, paired, residual, with_neighbours
+from rein3d_jax.lift.moments import halves, of_pixels, paired, plane_residual, with_neighbours
 from rein3d_jax.lift.partition import Level
 
-FORBIDDEN = 1e3  # colour costs stay below sqrt(3) a pixel
-TILT = 0.08  # of a linear gradient's mean square that counts: neighbours that overlap show most of it between them
-FLOOR = 1e-12  # of a mean square: leaves the square root's neighbourhood of 0 its order
+_FORBIDDEN = 1e3  # colour costs stay below sqrt(3) a pixel
+_TILT = 0.08  # of a linear gradient's mean square that counts: neighbours that overlap show most of it between them
+_FLOOR = 1e-12  # of a mean square: leaves the square root's neighbourhood of 0 its order
 
 
 def leaf_costs(rgb: jax.Array, distance: jax.Array, wanted: jax.Array, *, config: LiftConfig) -> dict[Level, jax.Array]:
-    """Costs for `partition`: of every leaf up to config.largest pixels a side, pixels times the root of the mean
-    square. Not to be spanned: steps of distance, bent surfaces, pixels that are not `wanted` (h, w)."""
+    """The costs for `partition`, of every leaf up to config.max_leaf_side pixels a side: pixels times the root of the
+    mean square. Not to be spanned: steps of distance, bent surfaces, pixels that are not `wanted` (h, w)."""
     height, width = distance.shape
     cells = {(0, 0): _pixels(rgb, distance, wanted, config)}
     costs = {(0, 0): jnp.zeros(distance.shape)}
-    for level in _levels(height, width, config.largest)[1:]:
+    for level in _levels(height, width, config.max_leaf_side)[1:]:
         below = (level[0], level[1] - 1) if level[1] else (level[0] - 1, 0)
         cells[level], costs[level] = _level(cells[below], level, config)
     return costs
@@ -31,7 +31,7 @@ def leaf_costs(rgb: jax.Array, distance: jax.Array, wanted: jax.Array, *, config
 
 @partial(jax.jit, static_argnums=3)
 def _pixels(rgb: jax.Array, distance: jax.Array, wanted: jax.Array, config: LiftConfig):
-    """(Moments of colour and inverse distance, what no leaf may span, area) of each pixel."""
+    """(PlaneMoments of colour and inverse distance, what no leaf may span, area) of each pixel."""
     apart = ~wanted | beside_steps(1 / distance, config.leaf_step)
     area = jnp.broadcast_to(jnp.cos(latitudes(len(rgb)))[:, None], distance.shape)
     return of_pixels(jnp.concatenate([rgb, 1 / distance[..., None]], axis=-1)), apart, area
@@ -50,8 +50,8 @@ def _level(below, level: Level, config: LiftConfig):
 
 
 def largest_side(pixels: int, largest: int) -> int:
-    """Of leaves along a side of so many pixels: a power of 2 that divides it. An eighth of a turn at most: what is
-    wider has no plane that the sphere is near to."""
+    """The longest side of leaves along a side of so many pixels: a power of 2 that divides it. An eighth of a circle at
+    most: what is wider has no plane that the sphere is near to."""
     most = max(min(largest, pixels // 8), 1)
     return max(1 << k for k in range(most.bit_length()) if pixels % (1 << k) == 0)
 
@@ -63,11 +63,11 @@ def _levels(height: int, width: int, largest: int) -> list[Level]:
 
 def _cost(moments, apart: jax.Array, area: jax.Array, shape: tuple[int, int], config: LiftConfig) -> jax.Array:
     wide, window = with_neighbours(moments, shape)
-    rest, tilt = residual(wide, window)
+    rest, tilt = plane_residual(wide, window)
     bend = jnp.sqrt(rest[..., 3]) / moments.mean[..., 3]
-    colour = jnp.sum((rest + TILT * tilt)[..., :3], axis=-1)
+    colour = jnp.sum((rest + _TILT * tilt)[..., :3], axis=-1)
     forbidden = (bend > config.flatness) | _touching(apart, shape)
-    return area * jnp.sqrt(colour + FLOOR) + FORBIDDEN * shape[0] * shape[1] * forbidden
+    return area * jnp.sqrt(colour + _FLOOR) + _FORBIDDEN * shape[0] * shape[1] * forbidden
 
 
 def _touching(apart: jax.Array, shape: tuple[int, int]) -> jax.Array:

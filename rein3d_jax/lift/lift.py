@@ -11,37 +11,53 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 
-from rein3d_jax.errors import InputError
-from rein3d_jax.geometry.resample import pad_sphere
 from rein3d_jax.geometry.rotations import quats_from_matrix
 from rein3d_jax.geometry.safe import safe_norm
-from rein3d_jax.geometry.sphere import latitudes, rays_of_pose, world_from_camera_axes
+from rein3d_jax.geometry.sphere import latitudes, rays_of_pose, world_from_panorama
 from rein3d_jax.geometry.spherical_harmonics import sh_from_rgb
 from rein3d_jax.lift.edges import snap_edges
 from rein3d_jax.lift.surface import slopes, surface_axes
 from rein3d_jax.scene import Gaussians, Panorama
+from rein3d_jax.settings import Settings, setting
 
 
 @dataclass(frozen=True)
-class LiftConfig:
-    capacity: int = 0  # slots of the scene's buffer; 0 gives twice the lifted pixels, room for what exploring adds
-    stride: int = 1  # lift every stride-th pixel of every stride-th row
-    opacity: float = 0.99
-    footprint: float = 0.85  # sigma over half the diagonal of a pixel's footprint; see footprint_sigma
-    steepest: float = 6.0  # tangent of incidence up to which a splat is stretched along its surface; 0: never
-    thickness: float = 0.3  # of a splat across its surface, over its width
-    # At most share x pixels become Gaussians, the fewer the smoother the picture and the flatter the surface; 1: all.
-    share: float = 1.0
-    largest: int = 16  # with a share below 1: most pixels along a side that one Gaussian stands for, a power of 2
-    flatness: float = 0.003  # there, relative: how far a surface may stray from the plane of its Gaussian
-    leaf_step: float = 0.05  # there, relative: steps of inverse distance that no Gaussian spans
-    snap_edges: bool = True
-    # See edges.snap_edges. At 256 x 512, 24 links hold a step blurred by a Gaussian of 3 pixels (4 % of the pixels
-    # off both surfaces before, none after; with 16 links still 4 %). The price on exact, furnished rooms of that
-    # size: 1.2 % of the pixels move by more than 2 % (faces seen nearly edge-on); 1.0 % with 16 links.
-    edge_ramp: int = 24
-    edge_step: float = 0.1
-    edge_slope: float = 0.01
+class LiftConfig(Settings):
+    """The lift's settings: how a panorama becomes Gaussians."""
+
+    capacity: int = setting(
+        0, "slots of the scene's buffer; 0: twice the lifted pixels, room for what exploring adds", within="[0, inf)"
+    )
+    opacity: float = setting(0.99, "opacity of every Gaussian", within="(0, 1)")
+    footprint: float = setting(0.85, "sigma over half the diagonal of a pixel's footprint", within="(0, inf)")
+    steepest: float = setting(
+        6.0, "tangent of incidence up to which a splat is stretched along its surface; 0: never", within="[0, inf)"
+    )
+    thickness: float = setting(0.3, "a splat's extent across its surface, over its width", within="(0, inf)")
+    share: float = setting(
+        1.0, "Gaussians per pixel at most, larger where picture and surface are smooth; 1: one for each pixel",
+        within="(0, 1]",
+    )  # fmt: skip
+    max_leaf_side: int = setting(
+        16, "pixels along a side that one Gaussian stands for at most, a power of 2; for a share below 1",
+        within="[1, inf)", unit="pixels",
+    )  # fmt: skip
+    flatness: float = setting(
+        0.003, "relative distance by which a surface may stray from its Gaussian's plane; for a share below 1",
+        within="[0, inf)",
+    )  # fmt: skip
+    leaf_step: float = setting(
+        0.05, "relative step of inverse distance that no Gaussian spans; for a share below 1", within="[0, inf)"
+    )
+    snap_edges: bool = setting(True, "make the blurred ramps of a distance map's edges steps again")
+    # At 256 x 512, 24 links hold a step blurred by a Gaussian of 3 pixels (4 % of the pixels off both surfaces before,
+    # none after; with 16 links still 4 %). The price on exact, furnished rooms of that size: 1.2 % of the pixels move
+    # by more than 2 % (faces seen nearly edge-on); 1.0 % with 16 links.
+    edge_ramp: int = setting(24, "width of the widest ramp that is made a step", within="[1, inf)", unit="pixels")
+    edge_step: float = setting(0.1, "relative change of distance across an edge, at least", within="[0, inf)")
+    edge_slope: float = setting(
+        0.01, "relative change per pixel below which the surface beside the ramp is reached", within="[0, inf)"
+    )
 
 
 def footprint_sigma(distance: jax.Array, row_pitch: float, latitude: jax.Array, footprint: float) -> jax.Array:
@@ -58,55 +74,38 @@ def footprint_sigma(distance: jax.Array, row_pitch: float, latitude: jax.Array, 
     return footprint * distance * row_pitch * 0.5 * jnp.sqrt(1 + jnp.cos(latitude) ** 2)
 
 
-def _box_colour(rgb: jax.Array, stride: int) -> jax.Array:
-    """Mean of (h, w, 3) over `stride` pixels centred ON each pixel (the ends of an even window weigh half)."""
-    reach = stride // 2
-    ends = (0.5 if stride % 2 == 0 else 1.0) / stride
-    weights = [ends if abs(k) == reach and reach else 1 / stride for k in range(-reach, reach + 1)]
-    padded = pad_sphere(rgb, reach)
-    rows = sum(weight * padded[k : k + rgb.shape[0]] for k, weight in enumerate(weights))
-    return sum(weight * rows[:, k : k + rgb.shape[1]] for k, weight in enumerate(weights))
-
-
 def _lift(
     panorama: Panorama, world_from_camera: jax.Array, select: jax.Array, *, config: LiftConfig = LiftConfig()
 ) -> Gaussians:
-    """Gaussians of capacity (h / stride) * (w / stride), row by row, spherical harmonics of degree 0.
+    """Gaussians of capacity h * w, row by row, spherical harmonics of degree 0.
 
     `world_from_camera` (4, 4) is the panorama's pose in OpenCV axes; the input's is rigid(world_from_camera_axes(), 0).
     `select` (h, w) bool says which pixels become Gaussians; of these, the ones whose distance is known come alive.
-    Raises InputError where the stride does not divide the height. Source: paper Sec. 3.1.
+    Source: paper Sec. 3.1.
     """
     height, width = panorama.distance.shape
-    stride = config.stride
     assert panorama.rgb.shape == (height, width, 3), panorama.rgb.shape
     assert select.shape == panorama.valid.shape == (height, width), (select.shape, panorama.valid.shape)
-    if stride < 1 or height % stride or width % stride:
-        raise InputError(f"lift.stride {stride} does not divide {width}x{height} pixels; set a divisor of {height}")
     known = panorama.valid & (panorama.distance > 0)
     distance = panorama.distance
     if config.snap_edges:
         distance = snap_edges(distance, known, ramp=config.edge_ramp, step=config.edge_step, slope=config.edge_slope)
-    # One pixel gives ray AND distance, so that its centre stays exactly on the surface at any stride.
-    chosen = (slice(stride // 2, None, stride), slice(stride // 2, None, stride))
-    alive = (select & known)[chosen].ravel()
-    distance_of_all, distance = distance, jnp.where(alive, distance[chosen].ravel(), 1.0)
-    slope = slopes(distance_of_all, known)
+    alive = (select & known).ravel()
+    slope = slopes(distance, known)
     slope *= jnp.minimum(1.0, config.steepest / jnp.maximum(safe_norm(slope, keepdims=True), 1e-6))
-    axes, tangent = (x[chosen].reshape(-1, *x.shape[2:]) for x in surface_axes(slope, height, width))
-    rays = rays_of_pose(world_from_camera, height, width)[chosen].reshape(-1, 3)
-    latitude = jnp.repeat(latitudes(height)[chosen[0]], width // stride)
-    sigma = footprint_sigma(distance, stride * jnp.pi / height, latitude, config.footprint)
+    axes, tangent = (x.reshape(-1, *x.shape[2:]) for x in surface_axes(slope, height, width))
+    distance = jnp.where(alive, distance.ravel(), 1.0)
+    rays = rays_of_pose(world_from_camera, height, width).reshape(-1, 3)
+    sigma = footprint_sigma(distance, jnp.pi / height, jnp.repeat(latitudes(height), width), config.footprint)
     along, across = jnp.sqrt(1 + tangent**2), jnp.ones_like(tangent)
     stretch = jnp.stack([along, across, config.thickness * across], axis=-1)
-    turn = jnp.matmul(world_from_camera[:3, :3], world_from_camera_axes().T, precision=jax.lax.Precision.HIGHEST)
-    count = distance.shape[0]
+    rotation = world_from_panorama(world_from_camera)
     return Gaussians(
         means=rays * distance[:, None] + world_from_camera[:3, 3],
         log_scales=jnp.log(sigma[:, None] * stretch),
-        quats=quats_from_matrix(jnp.matmul(turn, axes, precision=jax.lax.Precision.HIGHEST)),
-        opacity_logits=jnp.full(count, jnp.log(config.opacity / (1 - config.opacity))),
-        sh=sh_from_rgb(_box_colour(panorama.rgb, stride)[chosen].reshape(-1, 1, 3)),
+        quats=quats_from_matrix(jnp.matmul(rotation, axes, precision=jax.lax.Precision.HIGHEST)),
+        opacity_logits=jnp.full(distance.shape, jnp.log(config.opacity / (1 - config.opacity))),
+        sh=sh_from_rgb(panorama.rgb.reshape(-1, 1, 3)),
         alive=alive,
     )
 

@@ -9,8 +9,8 @@ import jax
 import jax.numpy as jnp
 
 Level = tuple[int, int]  # (log2 of rows, log2 of columns) of a rectangle
-PRICES = (-30.0, 40.0)  # natural logarithms between which the price lies
-BISECTIONS = 40  # the interval then is below float32's steps
+_PRICES = (-30.0, 40.0)  # natural logarithms between which the price lies
+_BISECTIONS = 40  # the interval then is below float32's steps
 
 
 class Leaves(NamedTuple):
@@ -37,7 +37,7 @@ def partition(cost: dict[Level, jax.Array], wanted: jax.Array, capacity: int) ->
         fits = _plan(cost, some, jnp.exp(middle))[1] <= capacity
         return jnp.where(fits, low, middle), jnp.where(fits, middle, high)
 
-    _, high = jax.lax.fori_loop(0, BISECTIONS, narrower, tuple(map(jnp.float32, PRICES)))
+    _, high = jax.lax.fori_loop(0, _BISECTIONS, narrower, tuple(map(jnp.float32, _PRICES)))
     return _read(_plan(cost, some, jnp.exp(high))[0], wanted, capacity)
 
 

@@ -21,7 +21,7 @@ ORIGIN = rigid(world_from_camera_axes(), jnp.zeros(3))
 EVERY = jnp.ones((HEIGHT, WIDTH), bool)
 RAYS = pixel_rays(HEIGHT, WIDTH)
 PATCH = EVERY.at[:, 16:].set(False).at[:8].set(False).at[24:].set(False)  # 16 x 16 pixels about the horizon
-CONFIG = LiftConfig(share=0.25, largest=4)
+CONFIG = LiftConfig(share=0.25, max_leaf_side=4)
 
 
 def box(seed: int = 0, size=(3.0, 2.5, 1.5)) -> Panorama:
@@ -60,7 +60,7 @@ def test_share_one_is_one_for_each_pixel():
 
 def test_leaves_of_one_pixel_are_its_splats():
     """Where nothing may be joined, what the leaves' formulas give is `lift`'s splat."""
-    config = LiftConfig(share=0.99, largest=4, flatness=0.0)  # nothing is flat enough
+    config = LiftConfig(share=0.99, max_leaf_side=4, flatness=0.0)  # nothing is flat enough
     select = EVERY.at[:, :1].set(False)  # a share of 0.99 does not hold these, but all the others
     ours, each = lift_adaptively(box(), ORIGIN, select, config=config), lift(box(), ORIGIN, select)
     each, ours = (jax.tree.map(lambda x, g=g: x[g.alive], g) for g in (each, ours))
@@ -117,7 +117,7 @@ def test_everything_scales_with_distance():
 
 
 def test_a_panorama_turned_by_the_largest_leaf_gives_a_turned_scene():
-    room, columns = box(), CONFIG.largest
+    room, columns = box(), CONFIG.max_leaf_side
     rolled = jax.tree.map(lambda image: jnp.roll(image, columns, axis=1), room)
     turn = -columns * 2 * np.pi / WIDTH  # columns turn right, angles left
     left = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
@@ -160,8 +160,6 @@ def test_rooms_side_by_side():
 def test_shares_that_cannot_be_met_are_refused():
     with pytest.raises(InputError, match=r"lift\.share 0\.01 is 20 Gaussians"):
         lift_adaptively(box(), ORIGIN, EVERY, config=replace(CONFIG, share=0.01))
-    with pytest.raises(InputError, match=r"set lift\.stride = 1"):
-        lift_adaptively(box(), ORIGIN, EVERY, config=replace(CONFIG, stride=2))
 
 
 def test_it_lowers_for_accelerators():

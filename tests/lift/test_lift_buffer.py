@@ -60,5 +60,5 @@ def test_new_slots_are_dead_and_finite() -> None:
 
 
 def test_a_smaller_buffer_is_refused_with_the_mend() -> None:
-    with pytest.raises(InputError, match=r"lift.capacity 2 < 3 pixels; raise it or double lift.stride"):
+    with pytest.raises(InputError, match=r"lift.capacity 2 < 3 pixels; raise it or lower lift.share"):
         with_capacity(scene(3, [True] * 3), 2)

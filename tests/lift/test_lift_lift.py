@@ -1,5 +1,7 @@
 """Laws of lifting: where splats stand, how large they are, and that together they cover."""
 
+import re
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -139,22 +141,16 @@ def test_any_valid_input_is_finite_with_unit_quaternions(seed: int, scale: float
     assert splats.alive.sum() == valid.sum()
 
 
-@pytest.mark.parametrize("stride", [2, 4])
-def test_stride_keeps_centres_on_the_surface_and_colours_in_place(stride: int) -> None:
-    """On a smooth sky the prefiltered colour is the pixel's own, to the box filter's second order."""
-    height = 32
-    rays = pixel_rays(height, 2 * height)
-    pano = Panorama(0.5 + 0.4 * rays, 2 + rays[..., 0], jnp.ones(rays.shape[:2], bool))
-    splats = lift(pano, ORIGIN, pano.valid, config=LiftConfig(stride=stride))
-    assert splats.means.shape == (height // stride * 2 * height // stride, 3)
-    distance = jnp.linalg.norm(splats.means, axis=-1)
-    unit = splats.means / distance[:, None]
-    np.testing.assert_allclose(distance, 2 + unit[:, 0], atol=1e-5)  # float32, metres near 3
-    # variance of the window, (stride^2 + 2) / 12 or less, x curvature 0.4 (pi / 32)^2, over rows and columns
-    bound = (stride**2 + 2) / 12 * 0.4 * (np.pi / height) ** 2
-    np.testing.assert_allclose(rgb_from_sh(splats.sh, unit), 0.5 + 0.4 * unit, atol=bound)
-
-
-def test_stride_that_does_not_divide_is_refused() -> None:
-    with pytest.raises(InputError, match=r"lift\.stride 3 does not divide 16x8"):
-        lift(panorama(), ORIGIN, EVERY, config=LiftConfig(stride=3))
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        ({"opacity": 1.0}, "opacity must be in (0, 1), not 1.0"),  # its logit is infinite
+        ({"thickness": 0.0}, "thickness must be in (0, inf), not 0.0"),  # so is its logarithm
+        ({"footprint": 0.0}, "footprint must be in (0, inf), not 0.0"),
+        ({"share": 0.0}, "share must be in (0, 1], not 0.0"),
+        ({"max_leaf_side": 0}, "max_leaf_side must be in [1, inf), not 0"),
+    ],
+)
+def test_settings_without_a_finite_splat_are_refused(bad: dict, message: str) -> None:
+    with pytest.raises(InputError, match=re.escape(message)):
+        LiftConfig(**bad)
