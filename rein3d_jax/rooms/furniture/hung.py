@@ -1,30 +1,14 @@
 """Lamps, plants, pictures, rugs and what else dresses a room."""
 
-from rein3d_jax.rooms.furniture.template import (
-    ACROSS,
-    DEEP,
-    D,
-    H,
-    M,
-    Part,
-    Piece,
-    W,
-    around,
-    ball,
-    box,
-    cylinder,
-    inset,
-    intervals,
-)
-
-_O = 0 * M
+from rein3d_jax.rooms.furniture.bounds import ACROSS, DEEP, D, H, M, O, W, around, inset, intervals
+from rein3d_jax.rooms.furniture.template import Part, Piece, ball, box, cylinder
 
 
 def _picture() -> tuple[Part, ...]:
     edge = 0.025
     return (
-        box(0, ACROSS, (-D / 2 + 0.003 * M, D / 2), (_O, H)),
-        box(1, inset(ACROSS, edge), (-D / 2, _O), inset((_O, H), edge), casts=False),
+        box(0, ACROSS, (-D / 2 + 0.003 * M, D / 2), (O, H)),
+        box(1, inset(ACROSS, edge), (-D / 2, O), inset((O, H), edge), casts=False),
     )
 
 
@@ -42,8 +26,8 @@ def _plant() -> tuple[Part, ...]:
         (-0.15, -0.15, 0.9, 0.3),
     ]  # fmt: skip
     return (
-        cylinder(0, around(_O, 0.28 * W), around(_O, 0.28 * D), (_O, 0.3 * H)),
-        cylinder(2, around(_O, 0.02), around(_O, 0.02), (0.3 * H, 0.7 * H)),
+        cylinder(0, around(O, 0.28 * W), around(O, 0.28 * D), (O, 0.3 * H)),
+        cylinder(2, around(O, 0.02), around(O, 0.02), (0.3 * H, 0.7 * H)),
         *_foliage(leaves, 0.45, 0.85),
     )
 
@@ -54,34 +38,34 @@ def _tall_plant() -> tuple[Part, ...]:
         (-0.2, -0.15, 0.93, 0.2),
     ]  # fmt: skip
     return (
-        cylinder(0, around(_O, 0.18), around(_O, 0.18), (_O, 0.34 * M)),
-        cylinder(2, around(_O, 0.025), around(_O, 0.025), (0.34 * M, 0.85 * H)),
+        cylinder(0, around(O, 0.18), around(O, 0.18), (O, 0.34 * M)),
+        cylinder(2, around(O, 0.025), around(O, 0.025), (0.34 * M, 0.85 * H)),
         *_foliage(crown, 0.5, 0.9),
     )
 
 
 def _floor_lamp() -> tuple[Part, ...]:
     return (
-        cylinder(0, around(_O, 0.14), around(_O, 0.14), (_O, 0.025 * M)),
-        cylinder(0, around(_O, 0.014), around(_O, 0.014), (0.025 * M, H - 0.25 * M)),
+        cylinder(0, around(O, 0.14), around(O, 0.14), (O, 0.025 * M)),
+        cylinder(0, around(O, 0.014), around(O, 0.014), (0.025 * M, H - 0.25 * M)),
         cylinder(1, ACROSS, DEEP, (H - 0.3 * M, H), casts=False),
     )
 
 
 def _pendant() -> tuple[Part, ...]:
     return (
-        cylinder(0, around(_O, 0.008), around(_O, 0.008), (0.24 * M, H)),
-        ball(1, ACROSS, DEEP, (_O, 0.28 * M), 0.6, False),
-        cylinder(1, around(_O, 0.35 * W), around(_O, 0.35 * D), (0.03 * M, 0.25 * M), 0.6, False),
+        cylinder(0, around(O, 0.008), around(O, 0.008), (0.24 * M, H)),
+        ball(1, ACROSS, DEEP, (O, 0.28 * M), 0.6, False),
+        cylinder(1, around(O, 0.35 * W), around(O, 0.35 * D), (0.03 * M, 0.25 * M), 0.6, False),
     )
 
 
 def _wall_shelf() -> tuple[Part, ...]:
     return (
-        box(0, ACROSS, DEEP, (_O, 0.03 * M)),
+        box(0, ACROSS, DEEP, (O, 0.03 * M)),
         box(1, (-0.45 * W, -0.1 * W), inset(DEEP, 0.02), (0.03 * M, 0.25 * M), 0.7),
-        cylinder(2, around(0.12 * W, 0.05), around(_O, 0.05), (0.03 * M, 0.2 * M), 0.5),
-        ball(2, around(0.32 * W, 0.07), around(_O, 0.07), (0.02 * M, 0.15 * M), 0.5),
+        cylinder(2, around(0.12 * W, 0.05), around(O, 0.05), (0.03 * M, 0.2 * M), 0.5),
+        ball(2, around(0.32 * W, 0.07), around(O, 0.07), (0.02 * M, 0.15 * M), 0.5),
     )
 
 
@@ -106,18 +90,18 @@ HUNG_PIECES = {
     "tall_plant": Piece("free", (0.7, 1.1), (0.7, 1.1), (1.5, 2.1), ("object", "leaf", "support"), _tall_plant()),
     "floor_lamp": Piece("free", (0.3, 0.45), (0.3, 0.45), (1.4, 1.75), ("support", "lampshade"), _floor_lamp()),
     "rug": Piece(
-        "flat", (1.2, 2.8), (0.9, 2.0), (0.008, 0.012), ("rug",), (box(0, ACROSS, DEEP, (_O, H), casts=False),)
+        "flat", (1.2, 2.8), (0.9, 2.0), (0.008, 0.012), ("rug",), (box(0, ACROSS, DEEP, (O, H), casts=False),)
     ),
     "pendant": Piece("ceiling", (0.3, 0.55), (0.3, 0.55), (0.4, 0.65), ("support", "lampshade"), _pendant()),
     "ceiling_disc": Piece(
         "ceiling", (0.3, 0.6), (0.3, 0.6), (0.07, 0.12), ("support", "lampshade"),
-        (cylinder(1, ACROSS, DEEP, (_O, H), casts=False),),
+        (cylinder(1, ACROSS, DEEP, (O, H), casts=False),),
     ),
     "spots": Piece(
         "ceiling", (0.8, 1.4), (0.1, 0.12), (0.12, 0.16), ("support", "lampshade"),
         (
             box(0, ACROSS, DEEP, (H - 0.03 * M, H)),
-            *(cylinder(1, around(f * W, 0.04), around(_O, 0.04), (_O, H - 0.03 * M), casts=False)
+            *(cylinder(1, around(f * W, 0.04), around(O, 0.04), (O, H - 0.03 * M), casts=False)
               for f in (-0.4, 0.0, 0.4)),
         ),
     ),

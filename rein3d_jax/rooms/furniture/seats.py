@@ -1,32 +1,14 @@
 """Tables, chairs, sofas and beds."""
 
-from rein3d_jax.rooms.furniture.template import (
-    ACROSS,
-    DEEP,
-    D,
-    H,
-    M,
-    Part,
-    Piece,
-    W,
-    around,
-    ball,
-    box,
-    cylinder,
-    inset,
-    intervals,
-    legs,
-    move_part,
-)
-
-_O = 0 * M  # the floor, or the middle
+from rein3d_jax.rooms.furniture.bounds import ACROSS, DEEP, D, H, M, O, W, around, inset, intervals
+from rein3d_jax.rooms.furniture.template import Part, Piece, ball, box, cylinder, legs, move_part
 
 
 def _chair(back: int, width: float = 0.42, texture: int = 1) -> tuple[Part, ...]:
     """A chair at the origin, in metres; `back` = 1 when it faces -y."""
     half = width / 2
     side = (half - 0.04) * M if back > 0 else -half * M
-    across = around(_O, half)
+    across = around(O, half)
     return (
         box(texture, across, across, (0.43 * M, 0.47 * M)),
         box(texture, across, (side, side + 0.04 * M), (0.5 * M, 0.9 * M)),
@@ -36,8 +18,8 @@ def _chair(back: int, width: float = 0.42, texture: int = 1) -> tuple[Part, ...]
 
 def _dining_chairs() -> tuple[Part, ...]:
     back, front = _chair(1), _chair(-1)
-    places = [(-W / 4 + _O, D / 2 - 0.25 * M, back), (W / 4 + _O, D / 2 - 0.25 * M, back)]
-    places += [(-W / 4 + _O, -D / 2 + 0.25 * M, front), (W / 4 + _O, -D / 2 + 0.25 * M, front)]
+    places = [(-W / 4 + O, D / 2 - 0.25 * M, back), (W / 4 + O, D / 2 - 0.25 * M, back)]
+    places += [(-W / 4 + O, -D / 2 + 0.25 * M, front), (W / 4 + O, -D / 2 + 0.25 * M, front)]
     return tuple(move_part(part, x, y) for x, y, chair in places for part in chair)
 
 
@@ -125,14 +107,14 @@ def _table() -> tuple[Part, ...]:
 def _round_table() -> tuple[Part, ...]:
     return (
         cylinder(0, ACROSS, DEEP, (H - 0.035 * M, H)),
-        cylinder(1, around(_O, 0.045), around(_O, 0.045), (_O, H - 0.035 * M)),
-        cylinder(1, around(_O, W / 3.5), around(_O, D / 3.5), (_O, 0.03 * M)),
+        cylinder(1, around(O, 0.045), around(O, 0.045), (O, H - 0.035 * M)),
+        cylinder(1, around(O, W / 3.5), around(O, D / 3.5), (O, 0.03 * M)),
         *_table_top(),
     )
 
 
-_DINING_TOP = (around(_O, W / 2 - 0.05 * M), around(_O, D / 2 - 0.35 * M))
-_ROUND_TOP = (around(_O, W / 2 - 0.4 * M), around(_O, D / 2 - 0.4 * M))
+_DINING_TOP = (around(O, W / 2 - 0.05 * M), around(O, D / 2 - 0.35 * M))
+_ROUND_TOP = (around(O, W / 2 - 0.4 * M), around(O, D / 2 - 0.4 * M))
 
 SEAT_PIECES = {
     "dining": Piece(
@@ -146,10 +128,10 @@ SEAT_PIECES = {
         "free", (1.5, 1.9), (1.5, 1.9), (0.72, 0.77), ("furniture", "front", "support", "object"),
         (
             cylinder(0, *_ROUND_TOP, (H - 0.04 * M, H)),
-            cylinder(2, around(_O, 0.06), around(_O, 0.06), (_O, H - 0.04 * M)),
-            cylinder(2, around(_O, 0.28), around(_O, 0.28), (_O, 0.04 * M)), *_table_top()[:2],
-            *(move_part(p, _O, D / 2 - 0.25 * M) for p in _chair(1)),
-            *(move_part(p, _O, -D / 2 + 0.25 * M) for p in _chair(-1)),
+            cylinder(2, around(O, 0.06), around(O, 0.06), (O, H - 0.04 * M)),
+            cylinder(2, around(O, 0.28), around(O, 0.28), (O, 0.04 * M)), *_table_top()[:2],
+            *(move_part(p, O, D / 2 - 0.25 * M) for p in _chair(1)),
+            *(move_part(p, O, -D / 2 + 0.25 * M) for p in _chair(-1)),
         ),
     ),
     "coffee_table": Piece(

@@ -2,25 +2,9 @@
 
 import numpy as np
 
-from rein3d_jax.rooms.furniture.template import (
-    ACROSS,
-    DEEP,
-    D,
-    H,
-    M,
-    Part,
-    Piece,
-    W,
-    around,
-    ball,
-    box,
-    cylinder,
-    inset,
-    intervals,
-    legs,
-)
+from rein3d_jax.rooms.furniture.bounds import ACROSS, DEEP, D, H, M, O, W, around, inset, intervals
+from rein3d_jax.rooms.furniture.template import Part, Piece, ball, box, cylinder, legs
 
-_O = 0 * M
 BODY = (-D / 2 + 0.03 * M, D / 2)  # doors and drawers stand a little before it, their handles end at the piece's front
 _FRONT = (-D / 2 + 0.026 * M, -D / 2 + 0.05 * M)
 _HANDLE = (-D / 2, -D / 2 + 0.026 * M)
@@ -28,9 +12,9 @@ _HANDLE = (-D / 2, -D / 2 + 0.026 * M)
 
 def _on_top(texture: int) -> tuple[Part, ...]:
     return (
-        cylinder(texture, around(-0.3 * W, 0.07), around(_O, 0.07), (H, H + 0.25 * M), 0.4),
-        ball(texture, around(0.1 * W, 0.1), around(_O, 0.1), (H - 0.02 * M, H + 0.18 * M), 0.3),
-        box(texture, around(0.28 * W, 0.11), around(_O, 0.08), (H, H + 0.14 * M), 0.4),
+        cylinder(texture, around(-0.3 * W, 0.07), around(O, 0.07), (H, H + 0.25 * M), 0.4),
+        ball(texture, around(0.1 * W, 0.1), around(O, 0.1), (H - 0.02 * M, H + 0.18 * M), 0.3),
+        box(texture, around(0.28 * W, 0.11), around(O, 0.08), (H, H + 0.14 * M), 0.4),
     )
 
 
@@ -58,9 +42,9 @@ def _case(boards: int) -> tuple[Part, ...]:
     """Sides, back and boards of a shelf."""
     thick = 0.025 * M
     return (
-        box(0, (-W / 2, -W / 2 + thick), DEEP, (_O, H)),
-        box(0, (W / 2 - thick, W / 2), DEEP, (_O, H)),
-        box(0, ACROSS, (D / 2 - 0.01 * M, D / 2), (_O, H), 0.7),
+        box(0, (-W / 2, -W / 2 + thick), DEEP, (O, H)),
+        box(0, (W / 2 - thick, W / 2), DEEP, (O, H)),
+        box(0, ACROSS, (D / 2 - 0.01 * M, D / 2), (O, H), 0.7),
         *(box(0, ACROSS, DEEP, (z[0], z[0] + thick)) for z in intervals(boards, 0.05 * M, H - 0.025 * M)),
         box(0, ACROSS, DEEP, (H - thick, H)),
     )
@@ -74,15 +58,15 @@ def _filled_shelf() -> tuple[Part, ...]:
         deep = (-D / 2 + 0.03 * M, D / 2 - 0.02 * M)
         fill.append(box(1, (-W / 2 + 0.03 * M, cut), deep, (on, high), 0.75))
         fill.append(box(2, (cut + 0.06 * W, W / 2 - 0.04 * M), deep, (on, on + 0.5 * (z[1] - z[0])), 0.4))
-        fill.append(ball(3, around(0.5 * cut + 0.25 * W, 0.07), around(_O, 0.07), (on - 0.01 * M, on + 0.15 * M), 0.3))
+        fill.append(ball(3, around(0.5 * cut + 0.25 * W, 0.07), around(O, 0.07), (on - 0.01 * M, on + 0.15 * M), 0.3))
     return tuple(fill)
 
 
 def _television() -> tuple[Part, ...]:
-    screen = around(_O, 0.38 * W)
+    screen = around(O, 0.38 * W)
     return (
         box(2, screen, around(0.1 * D, 0.02), (H + 0.06 * M, H + 0.06 * M + 0.43 * W), 0.85),
-        box(2, around(_O, 0.15), around(0.1 * D, 0.08), (H, H + 0.06 * M), 0.85),
+        box(2, around(O, 0.15), around(0.1 * D, 0.08), (H, H + 0.06 * M), 0.85),
     )
 
 
@@ -93,7 +77,7 @@ def _desk() -> tuple[Part, ...]:
         box(0, (W / 2 - 0.42 * M, W / 2 - 0.05 * M), inset(DEEP, 0.05), (0.1 * M, H - 0.03 * M), 0.6),
         box(2, around(-0.1 * W, 0.28), around(0.2 * D, 0.015), (H + 0.1 * M, H + 0.45 * M), 0.6),
         box(2, around(-0.1 * W, 0.1), around(0.2 * D, 0.07), (H, H + 0.1 * M), 0.6),
-        box(3, around(0.25 * W, 0.11), around(_O, 0.15), (H, H + 0.05 * M), 0.6),
+        box(3, around(0.25 * W, 0.11), around(O, 0.15), (H, H + 0.05 * M), 0.6),
         cylinder(3, around(-0.42 * W, 0.04), around(0.1 * D, 0.04), (H, H + 0.11 * M), 0.6),
         box(3, around(-0.1 * W, 0.2), around(-0.2 * D, 0.07), (H, H + 0.02 * M), 0.5),
     )
@@ -111,20 +95,20 @@ STORAGE_PIECES = {
         "wall", (1.2, 2.0), (0.36, 0.45), (0.35, 0.55), ("furniture", "front", "screen", "object"),
         (
             *_CABINET, *doors(3, 1, 0.08 * M, H - 0.03 * M), *_television(),
-            cylinder(3, around(0.44 * W, 0.05), around(_O, 0.05), (H, H + 0.2 * M), 0.5),
+            cylinder(3, around(0.44 * W, 0.05), around(O, 0.05), (H, H + 0.2 * M), 0.5),
         ),
     ),
     "nightstand": Piece(
         "wall", (0.4, 0.55), (0.36, 0.42), (0.42, 0.6), ("furniture", "front", "support", "lampshade"),
         (
             *_CABINET, *doors(1, 2, 0.08 * M, H - 0.03 * M),
-            cylinder(2, around(_O, 0.02), around(_O, 0.02), (H, H + 0.25 * M), 0.7),
-            cylinder(3, around(_O, 0.11), around(_O, 0.11), (H + 0.22 * M, H + 0.4 * M), 0.7, False),
+            cylinder(2, around(O, 0.02), around(O, 0.02), (H, H + 0.25 * M), 0.7),
+            cylinder(3, around(O, 0.11), around(O, 0.11), (H + 0.22 * M, H + 0.4 * M), 0.7, False),
         ),
     ),
     "wardrobe": Piece(
         "wall", (1.0, 2.2), (0.55, 0.65), (1.9, 2.25), _TEXTURES,
-        (box(0, ACROSS, BODY, (_O, H)), *doors(3, 1, 0.06 * M, H - 0.03 * M)),
+        (box(0, ACROSS, BODY, (O, H)), *doors(3, 1, 0.06 * M, H - 0.03 * M)),
     ),
     "shelf": Piece(
         "wall", (0.7, 1.4), (0.26, 0.36), (1.4, 2.1), ("furniture", "books", "object", "object"),

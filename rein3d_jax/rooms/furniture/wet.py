@@ -1,30 +1,15 @@
 """Kitchen and bathroom pieces."""
 
+from rein3d_jax.rooms.furniture.bounds import ACROSS, DEEP, D, H, M, O, W, around, inset
 from rein3d_jax.rooms.furniture.storage import BODY, doors
-from rein3d_jax.rooms.furniture.template import (
-    ACROSS,
-    DEEP,
-    D,
-    H,
-    M,
-    Part,
-    Piece,
-    W,
-    around,
-    ball,
-    box,
-    cylinder,
-    inset,
-)
-
-_O = 0 * M
+from rein3d_jax.rooms.furniture.template import Part, Piece, ball, box, cylinder
 
 
 def _counter(columns: int) -> tuple[Part, ...]:
     top = (H - 0.04 * M, H)
     return (
         box(0, ACROSS, BODY, (0.1 * M, H - 0.04 * M)),
-        box(0, inset(ACROSS, 0.02), (-D / 2 + 0.08 * M, D / 2), (_O, 0.1 * M)),
+        box(0, inset(ACROSS, 0.02), (-D / 2 + 0.08 * M, D / 2), (O, 0.1 * M)),
         box(2, ACROSS, DEEP, top),
         box(2, ACROSS, (D / 2 - 0.015 * M, D / 2), (H, H + 0.4 * M), 0.4),
         *doors(columns, 1, 0.12 * M, H - 0.06 * M, 1, 3),
@@ -40,11 +25,11 @@ def _counter(columns: int) -> tuple[Part, ...]:
 def _bathtub() -> tuple[Part, ...]:
     rim = 0.07 * M
     return (
-        box(0, (-W / 2, -W / 2 + rim), DEEP, (_O, H)),
-        box(0, (W / 2 - rim, W / 2), DEEP, (_O, H)),
-        box(0, ACROSS, (-D / 2, -D / 2 + rim), (_O, H)),
-        box(0, ACROSS, (D / 2 - rim, D / 2), (_O, H)),
-        box(0, ACROSS, DEEP, (_O, 0.15 * M)),
+        box(0, (-W / 2, -W / 2 + rim), DEEP, (O, H)),
+        box(0, (W / 2 - rim, W / 2), DEEP, (O, H)),
+        box(0, ACROSS, (-D / 2, -D / 2 + rim), (O, H)),
+        box(0, ACROSS, (D / 2 - rim, D / 2), (O, H)),
+        box(0, ACROSS, DEEP, (O, 0.15 * M)),
         cylinder(1, around(-0.4 * W, 0.02), around(0.42 * D, 0.02), (H, H + 0.15 * M)),
         box(2, (0.1 * W, 0.35 * W), (-D / 2, -D / 2 + 0.09 * M), (0.5 * H, H + 0.015 * M), 0.4),
     )
@@ -52,11 +37,11 @@ def _bathtub() -> tuple[Part, ...]:
 
 def _shower() -> tuple[Part, ...]:
     return (
-        box(0, ACROSS, DEEP, (_O, 0.06 * M)),
+        box(0, ACROSS, DEEP, (O, 0.06 * M)),
         box(2, (W / 2 - 0.03 * M, W / 2), DEEP, (0.06 * M, H)),
-        cylinder(1, around(_O, 0.012), around(D / 2 - 0.05 * M, 0.012), (0.9 * M, H)),
-        cylinder(1, around(_O, 0.11), around(D / 2 - 0.2 * M, 0.11), (H - 0.04 * M, H)),
-        box(1, around(_O, 0.012), (D / 2 - 0.2 * M, D / 2 - 0.05 * M), (H - 0.02 * M, H)),
+        cylinder(1, around(O, 0.012), around(D / 2 - 0.05 * M, 0.012), (0.9 * M, H)),
+        cylinder(1, around(O, 0.11), around(D / 2 - 0.2 * M, 0.11), (H - 0.04 * M, H)),
+        box(1, around(O, 0.012), (D / 2 - 0.2 * M, D / 2 - 0.05 * M), (H - 0.02 * M, H)),
     )
 
 
@@ -65,9 +50,9 @@ def _vanity() -> tuple[Part, ...]:
         box(0, ACROSS, BODY, (0.2 * M, H - 0.03 * M)),
         box(2, ACROSS, DEEP, (H - 0.03 * M, H)),
         *doors(2, 1, 0.22 * M, H - 0.05 * M, 0, 3),
-        ball(1, around(_O, 0.23), around(-0.03 * D, 0.18), (H - 0.06 * M, H + 0.12 * M)),
-        cylinder(3, around(_O, 0.015), around(0.4 * D, 0.015), (H, H + 0.22 * M)),
-        box(3, around(_O, 0.012), (0.1 * D, 0.4 * D), (H + 0.2 * M, H + 0.22 * M)),
+        ball(1, around(O, 0.23), around(-0.03 * D, 0.18), (H - 0.06 * M, H + 0.12 * M)),
+        cylinder(3, around(O, 0.015), around(0.4 * D, 0.015), (H, H + 0.22 * M)),
+        box(3, around(O, 0.012), (0.1 * D, 0.4 * D), (H + 0.2 * M, H + 0.22 * M)),
         cylinder(1, around(0.4 * W, 0.035), around(0.2 * D, 0.035), (H, H + 0.16 * M), 0.6),
         box(3, around(-0.38 * W, 0.06), around(0.1 * D, 0.06), (H, H + 0.08 * M), 0.4),
     )
@@ -75,17 +60,17 @@ def _vanity() -> tuple[Part, ...]:
 
 def _toilet() -> tuple[Part, ...]:
     return (
-        box(0, around(_O, 0.09), (-D / 2 + 0.15 * M, D / 2 - 0.1 * M), (_O, 0.25 * M)),
-        ball(0, around(_O, 0.19), (-D / 2, D / 2 - 0.12 * M), (0.1 * M, 0.44 * M)),
-        cylinder(0, around(_O, 0.19), (-D / 2, D / 2 - 0.12 * M), (0.38 * M, 0.43 * M)),
-        box(0, around(_O, 0.2), (D / 2 - 0.18 * M, D / 2), (0.36 * M, H)),
-        box(1, around(_O, 0.04), around(D / 2 - 0.09 * M, 0.03), (H, H + 0.01 * M)),
+        box(0, around(O, 0.09), (-D / 2 + 0.15 * M, D / 2 - 0.1 * M), (O, 0.25 * M)),
+        ball(0, around(O, 0.19), (-D / 2, D / 2 - 0.12 * M), (0.1 * M, 0.44 * M)),
+        cylinder(0, around(O, 0.19), (-D / 2, D / 2 - 0.12 * M), (0.38 * M, 0.43 * M)),
+        box(0, around(O, 0.2), (D / 2 - 0.18 * M, D / 2), (0.36 * M, H)),
+        box(1, around(O, 0.04), around(D / 2 - 0.09 * M, 0.03), (H, H + 0.01 * M)),
     )
 
 
 def _tall_box() -> tuple[Part, ...]:
     return (
-        box(0, ACROSS, (-D / 2 + 0.09 * M, D / 2), (_O, H)),
+        box(0, ACROSS, (-D / 2 + 0.09 * M, D / 2), (O, H)),
         box(0, inset(ACROSS, 0.004), (-D / 2 + 0.04 * M, -D / 2 + 0.085 * M), (0.03 * M, 0.36 * H), casts=False),
         box(0, inset(ACROSS, 0.004), (-D / 2 + 0.04 * M, -D / 2 + 0.085 * M), (0.375 * H, H), casts=False),
         box(1, (W / 2 - 0.08 * M, W / 2 - 0.055 * M), (-D / 2, -D / 2 + 0.04 * M), (0.42 * H, 0.65 * H), casts=False),
@@ -96,9 +81,9 @@ def _tall_box() -> tuple[Part, ...]:
 def _washer() -> tuple[Part, ...]:
     return (
         box(0, ACROSS, BODY, (0.02 * M, H)),
-        ball(1, around(_O, 0.2), around(-D / 2 + 0.03 * M, 0.03), around(0.45 * M, 0.2), casts=False),
+        ball(1, around(O, 0.2), around(-D / 2 + 0.03 * M, 0.03), around(0.45 * M, 0.2), casts=False),
         box(1, (0.05 * W, 0.4 * W), around(-D / 2 + 0.03 * M, 0.005), (H - 0.12 * M, H - 0.06 * M), casts=False),
-        box(2, around(-0.1 * W, 0.14), around(_O, 0.14), (H, H + 0.22 * M), 0.5),
+        box(2, around(-0.1 * W, 0.14), around(O, 0.14), (H, H + 0.22 * M), 0.5),
     )
 
 
@@ -108,8 +93,8 @@ def _island() -> tuple[Part, ...]:
         for f in (-0.25, 0.25)
         for part in (
             cylinder(3, around(f * W, 0.17), around(-D / 2 + 0.17 * M, 0.17), (0.62 * M, 0.67 * M)),
-            cylinder(3, around(f * W, 0.025), around(-D / 2 + 0.17 * M, 0.025), (_O, 0.62 * M)),
-            cylinder(3, around(f * W, 0.16), around(-D / 2 + 0.17 * M, 0.16), (_O, 0.02 * M)),
+            cylinder(3, around(f * W, 0.025), around(-D / 2 + 0.17 * M, 0.025), (O, 0.62 * M)),
+            cylinder(3, around(f * W, 0.16), around(-D / 2 + 0.17 * M, 0.16), (O, 0.02 * M)),
         )
     ]
     return (
@@ -127,7 +112,7 @@ WET_PIECES = {
     "short_counter": Piece("wall", (0.9, 1.6), (0.6, 0.65), (0.86, 0.94), _KITCHEN, _counter(2)),
     "wall_cabinets": Piece(
         "hung", (1.2, 2.6), (0.3, 0.36), (0.55, 0.75), ("front", "front", "metal"),
-        (box(0, ACROSS, BODY, (_O, H)), *doors(4, 1, _O, H)),
+        (box(0, ACROSS, BODY, (O, H)), *doors(4, 1, O, H)),
         (1.4, 1.5),
     ),
     "island": Piece("free", (1.2, 1.8), (1.0, 1.2), (0.86, 0.94), ("front", "front", "stone", "support"), _island()),
