@@ -1,5 +1,5 @@
 """Training examples in a folder, one memory-mapped array a field: made once, since tracing, rendering and filling a
-frame cost more than a step of training on it. A folder that is still being written is read as far as it goes.
+frame cost more than a step of training on it. A folder that is being written is read as far as it goes.
 
     FIELD.npy    (capacity, t, ...) uint8 colours and alpha, float16 metres, float32 positions
     count.json   {"done": how many examples are whole}
@@ -13,21 +13,21 @@ import numpy as np
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
-from rein3d_jax.restore.learned.condition import FILLS, Clip
+from rein3d_jax.restore.learned.condition import CANDIDATES, Clip
 from rein3d_jax.restore.learned.loss import Example
 
 COUNT = "count.json"
 
 
 def fields(frames: int, height: int) -> dict[str, tuple[tuple[int, ...], type]]:
-    """Each array's shape for one example, and how it is stored."""
+    """Shape of each array for one example, and its stored type."""
     picture = (frames, height, 2 * height)
     return {
         "rgb": ((*picture, 3), np.uint8),
         "alpha": (picture, np.uint8),
         "distance": (picture, np.float16),
-        "fill_rgb": ((*picture, FILLS, 3), np.uint8),
-        "fill_distance": ((*picture, FILLS), np.float16),
+        "fill_rgb": ((*picture, CANDIDATES, 3), np.uint8),
+        "fill_distance": ((*picture, CANDIDATES), np.float16),
         "position": ((frames, 3), np.float32),
         "clean_rgb": ((*picture, 3), np.uint8),
         "clean_distance": (picture, np.float16),
@@ -35,7 +35,7 @@ def fields(frames: int, height: int) -> dict[str, tuple[tuple[int, ...], type]]:
 
 
 class ExampleStore:
-    """Examples read by number. `open_fraction` says how much of each there is to learn from."""
+    """Examples read by number. Raises InputError where the folder holds none."""
 
     def __init__(self, folder: str | Path):
         self.folder = Path(folder)
@@ -50,13 +50,13 @@ class ExampleStore:
             raise InputError(f"{self.folder / COUNT} cannot be read: {_MAKE}") from error
 
     def example(self, index: int, frames: np.ndarray | slice = slice(None)) -> Example:
-        """Example `index` as float32, or some of its frames."""
+        """Example `index`, or some of its frames, as float32."""
         parts = {name: _floats(array[index][frames]) for name, array in self.arrays.items()}
         clean = {name: parts.pop(name) for name in ("clean_rgb", "clean_distance")}
         return Example(Clip(**parts), **clean)
 
     def open_fractions(self, count: int) -> np.ndarray:
-        """(count,) the share of each example's pixels that is a hole, on every 4th pixel."""
+        """Share (count,) of each example's pixels that is a hole, on every 4th pixel."""
         for index in range(len(self._open_fractions), count):
             self._open_fractions.append(float((self.arrays["alpha"][index, 1:, ::4, ::4] < 128).mean()))
         return np.array(self._open_fractions[:count])
@@ -74,8 +74,8 @@ class ExampleStore:
 
 
 def write_examples(folder: str | Path, example: Callable[[int], Example], count: int) -> Iterator[int]:
-    """Stores examples 0 to count - 1, all of one shape; yields how many are whole, after each. Killed and begun again,
-    it goes on. Raises InputError where the folder holds examples of another count or shape."""
+    """Numbers of whole examples, after each that is stored, of examples 0 to count - 1, all of one shape. Killed and
+    begun again, it goes on. Raises InputError where the folder holds examples of another count or shape."""
     folder, arrays = Path(folder), {}
     folder.mkdir(parents=True, exist_ok=True)
     for index in range(_done(folder, count), count):

@@ -76,14 +76,14 @@ def with_keys(text: str) -> str:
 
 def _recipes() -> dict[str, tuple[type, ...]]:
     from experiments.build_dataset.dataset import DatasetConfig
-    from experiments.build_examples.__main__ import ExamplesConfig
-    from experiments.reconstruct.__main__ import ReconstructConfig
-    from experiments.train_restore.config import TrainConfig
-    from experiments.train_restore.wan_config import WanTrainConfig
+    from experiments.build_examples.example import ExamplesConfig
+    from experiments.reconstruct.config import ReconstructConfig
+    from experiments.train_restore.learned.config import LearnedTrainConfig
+    from experiments.train_restore.wan.config import WanTrainConfig
 
     return {
         "reconstruct": (ReconstructConfig,),
-        "train_restore": (TrainConfig, WanTrainConfig),
+        "train_restore": (LearnedTrainConfig, WanTrainConfig),
         "build_examples": (ExamplesConfig,),
         "build_dataset": (DatasetConfig,),
     }

@@ -1,4 +1,4 @@
-"""What the recipe's restorer was trained to, read from restore.weights."""
+"""The trained network of the recipe's restorer, read from restore.weights."""
 
 import hashlib
 from pathlib import Path
@@ -7,16 +7,16 @@ import jax
 
 from experiments.wan_weights import read_wan
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.weights.restorer_weights import SHIPPED, read_restorer
+from rein3d_jax.io.weights.restorer_weights import SHIPPED_RESTORER, read_restorer
 from rein3d_jax.restore.learned.config import NetworkConfig
 from rein3d_jax.restore.learned.network import initial_parameters
 from rein3d_jax.restore.learned.sample import Learned
-from rein3d_jax.restore.restorer import DIFFUSION, LEARNED, Network, RestoreConfig
+from rein3d_jax.restore.restorer import DIFFUSION, LEARNED, RestoreConfig, TrainedNetwork
 
 
-def read_network(config: RestoreConfig) -> Network | None:
-    """None for the fills, which were not trained. Raises InputError for weights that are missing, damaged or made for
-    another network, and for a size of picture that the network does not take."""
+def read_network(config: RestoreConfig) -> TrainedNetwork | None:
+    """Trained network of the restorer; None for the fills. Raises InputError for weights that are missing, damaged or
+    made for another network, and for a size of picture that the network does not take."""
     if config.method == LEARNED:
         return _learned(config)
     if config.method != DIFFUSION:
@@ -27,10 +27,10 @@ def read_network(config: RestoreConfig) -> Network | None:
 
 
 def weights_fingerprint(config: RestoreConfig) -> str:
-    """What the weights' files hold, as one hash: a resumed job must not mix two networks. Empty for the fills."""
+    """Hash of the weights' files: a resumed job must not mix two networks. Empty for the fills."""
     if config.method not in (LEARNED, DIFFUSION):
         return ""
-    path, digest = Path(config.weights or SHIPPED), hashlib.sha256()
+    path, digest = Path(config.weights or SHIPPED_RESTORER), hashlib.sha256()
     for file in sorted(path.rglob("*.safetensors")) if path.is_dir() else [path]:
         with open(file, "rb") as content:
             digest.update(hashlib.file_digest(content, "sha256").digest())
@@ -38,7 +38,7 @@ def weights_fingerprint(config: RestoreConfig) -> str:
 
 
 def _learned(config: RestoreConfig) -> Learned:
-    path = config.weights or SHIPPED
+    path = config.weights or SHIPPED_RESTORER
     parameters, sizes = read_restorer(path)
     try:
         network = NetworkConfig(**sizes)

@@ -1,4 +1,4 @@
-"""The full-size network's weights in a folder, as diffusers lays it out, and the words it is given:
+"""The full-size network's weights in a folder, as diffusers lays it out, and its embedded prompts:
 
     transformer/    safetensors of the transformer, in the names of diffusers or of Wan's own release
     vae/            the same of the VAE
@@ -17,16 +17,17 @@ import numpy as np
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.weights.safetensors_folder import load_params, save_params, tensor_names
 from rein3d_jax.restore.wan.config import WanConfig
-from rein3d_jax.restore.wan.names import Row, dit_rows, layout_of, vae_rows
+from rein3d_jax.restore.wan.names import TensorRow, dit_rows, layout_of, vae_rows
 from rein3d_jax.restore.wan.restore import WanParams
 from rein3d_jax.restore.wan.training.memory import dit_shapes, vae_shapes
 
-TEXT_LENGTH = 512  # of an embedded prompt: the padding takes part in attention, so it may not be left out
-PROMPTS = ("text", "no_text")
+_TEXT_LENGTH = 512  # of an embedded prompt: the padding takes part in attention, so it may not be left out
+_PROMPTS = ("text", "no_text")
 
 
 def read_wan(folder: str | Path, config: WanConfig) -> WanParams:
-    """Raises InputError, naming the folder or tensor, for what is missing, unknown or of another shape."""
+    """Parameters from a folder. Raises InputError, naming the folder or tensor, for what is missing, unknown or of
+    another shape."""
     folder = Path(folder)
     for name in ("transformer", "vae", "text"):
         if not (folder / name).is_dir():
@@ -43,14 +44,14 @@ def write_wan(folder: str | Path, params: WanParams, config: WanConfig) -> None:
     """Writes what `read_wan` reads, in the names of diffusers."""
     folder = Path(folder)
     dit, vae = dit_rows(params.dit, config.dit, "diffusers"), vae_rows(params.vae, config.vae, "diffusers")
-    texts = {name: getattr(params, name) for name in PROMPTS}
+    texts = {name: getattr(params, name) for name in _PROMPTS}
     for name, rows, part in (("vae", vae, params.vae), ("text", _text_rows(texts), texts)):
         save_params(folder / name, rows, part)
     save_params(folder / "transformer", dit, params.dit)  # last: it is the one that a reader looks for
 
 
 def random_wan(seed: int, config: WanConfig) -> WanParams:
-    """A network that knows nothing, its VAE no more, with text of zeros: for trying out what handles weights. Drawn by
+    """Parameters of an untrained network and VAE, with text of zeros: for trying out what handles weights. Drawn by
     NumPy, since compiling the modules' own initialisers takes longer than a tiny training run."""
     random = np.random.default_rng(seed)
     dit, vae = (_drawn(random, shapes) for shapes in (dit_shapes(config.dit), vae_shapes(config.vae)))
@@ -58,7 +59,8 @@ def random_wan(seed: int, config: WanConfig) -> WanParams:
 
 
 def _drawn(random: np.random.Generator, shapes: Any) -> Any:
-    """Kernels keep variance, norms change nothing, and control is not heard yet, as in the modules' initialisers."""
+    """Leaves as the modules' initialisers draw them: kernels preserve variance, norms are 1, control has no effect
+    yet."""
 
     def draw(path, leaf):
         *_, name, last = ("", *(key.key for key in path))
@@ -73,7 +75,7 @@ def _drawn(random: np.random.Generator, shapes: Any) -> Any:
 
 
 def _stacked(path, leaf) -> int:
-    """How many blocks a leaf holds."""
+    """Number of blocks that a leaf holds."""
     return leaf.shape[0] if path[0].key == "steps" else 1
 
 
@@ -82,8 +84,8 @@ def _read(folder: Path, rows_of, shapes: Any, config: Any) -> Any:
 
 
 def _text_shapes(config: WanConfig) -> dict[str, jax.ShapeDtypeStruct]:
-    return {name: jax.ShapeDtypeStruct((TEXT_LENGTH, config.dit.text_dim), jnp.float32) for name in PROMPTS}
+    return {name: jax.ShapeDtypeStruct((_TEXT_LENGTH, config.dit.text_dim), jnp.float32) for name in _PROMPTS}
 
 
-def _text_rows(texts: dict[str, Any]) -> list[Row]:
-    return [Row((name,), None, name, x.shape, (0, 1)) for name, x in texts.items()]
+def _text_rows(texts: dict[str, Any]) -> list[TensorRow]:
+    return [TensorRow((name,), None, name, x.shape, (0, 1)) for name, x in texts.items()]

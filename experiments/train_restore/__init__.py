@@ -1,1 +1,1 @@
-"""Training of both restoration networks."""
+"""Training of both restoration networks: what they share, and a folder for each."""

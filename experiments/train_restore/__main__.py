@@ -11,20 +11,20 @@ import sys
 
 from experiments.command import CommandParser
 from experiments.config import load_config, read_recipe
-from experiments.train_restore.config import TrainConfig
-from experiments.train_restore.learned import train as train_learned
-from experiments.train_restore.wan import train as train_wan
-from experiments.train_restore.wan_config import WanTrainConfig
+from experiments.train_restore.learned.config import LearnedTrainConfig
+from experiments.train_restore.learned.train import train_learned
+from experiments.train_restore.wan.config import WanTrainConfig
+from experiments.train_restore.wan.train import train_wan
 from rein3d_jax.errors import InputError
 from rein3d_jax.parallel import join_hosts
 
-MODELS = {"learned": (TrainConfig, train_learned), "diffusion": (WanTrainConfig, train_wan)}  # as restore.method
+MODELS = {"learned": (LearnedTrainConfig, train_learned), "diffusion": (WanTrainConfig, train_wan)}  # as restore.method
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where the input is at fault."""
     parser = CommandParser("train_restore", __doc__)
-    parser.add_recipe(TrainConfig, WanTrainConfig, example="tiny_train")
+    parser.add_recipe(LearnedTrainConfig, WanTrainConfig, example="tiny_train")
     parser.add_argument("--resume", action="store_true", help="go on after the output folder's last checkpoint")
     parser.add_argument("--address", metavar="HOST:PORT", help="of process 0, where several hosts train as one")
     parser.add_argument("--processes", type=int, metavar="N", help="how many hosts")

@@ -1,5 +1,5 @@
 """One step of training for any network: the gradient over the whole batch, however it is split, an update, the guard
-that refuses steps out of the common, and the parameters' moving average."""
+that refuses steps whose gradient is not finite or far above its running norm, and the parameters' moving average."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,30 +9,30 @@ import jax.numpy as jnp
 import optax
 from flax import struct
 
-from experiments.train_restore.config import GuardConfig, OptimizerConfig
+from experiments.train_restore.config import GuardConfig, OptimizerConfig, TrainConfig
 from rein3d_jax.parallel.data_parallel import Total
 
 # (parameters, a part of the batch) -> (sum of the penalties, sum of the weights)
 Loss = Callable[[Any, Any], tuple[jax.Array, jax.Array]]
 
-USUAL = 0.98  # decay of the usual gradient norm
+_NORM_DECAY = 0.98  # of the gradient's running norm
 
 
 @struct.dataclass
 class TrainState:
-    """All that the next step depends on, besides the config and the batch."""
+    """State of training: all that the next step depends on, besides the config and the batch."""
 
     step: jax.Array  # () int32, steps taken or skipped
     parameters: Any
     average: Any  # the parameters' moving average
     optimizer: optax.OptState
-    usual: jax.Array  # () the gradient's usual norm; 0 until the first step
+    running_norm: jax.Array  # () the gradient's; 0 until the first step
     skipped: jax.Array  # () int32, steps that the guard refused, in all
     in_a_row: jax.Array  # () int32, of them, since the last one taken
 
 
 def optimizer(config: OptimizerConfig, steps: int) -> optax.GradientTransformation:
-    """Clip, then AdamW; the rate rises over the warm-up, stays, and falls over the cool-down."""
+    """Optimizer: clip, then AdamW; the rate rises over the warm-up, stays, and falls over the cool-down."""
     parts = [optax.linear_schedule(0.0, config.rate, config.warmup), optax.constant_schedule(config.rate)]
     ends = [config.warmup]
     if config.cooldown:
@@ -50,38 +50,39 @@ def optimizer(config: OptimizerConfig, steps: int) -> optax.GradientTransformati
     )
 
 
-def first_state(parameters: Any, config: OptimizerConfig, steps: int) -> TrainState:
-    """The state before the first step."""
+def first_state(parameters: Any, config: TrainConfig) -> TrainState:
+    """State before the first step."""
     zero, average = jnp.zeros((), jnp.int32), jax.tree.map(jnp.copy, parameters)
-    return TrainState(zero, parameters, average, optimizer(config, steps).init(parameters), jnp.zeros(()), zero, zero)
+    moments = optimizer(config.optimizer, config.steps).init(parameters)
+    return TrainState(zero, parameters, average, moments, jnp.zeros(()), zero, zero)
 
 
 def guarded_step(
-    state: TrainState, batch: Any, total: Total, *, loss: Loss, config: OptimizerConfig, guard: GuardConfig, steps: int
+    state: TrainState, batch: Any, total: Total, *, loss: Loss, config: TrainConfig
 ) -> tuple[TrainState, dict[str, jax.Array]]:
-    """The next state and what there is to say of it. `batch` has a leading axis of parts, taken one after another;
+    """The next state and its metrics. `batch` has a leading axis of parts, taken one after another;
     `total` sums over devices (parallel/data_parallel.py)."""
     gradient, value = batch_gradient(loss, state.parameters, batch, total)
-    norm = optax.tree.norm(gradient)
-    changes, moments = optimizer(config, steps).update(gradient, state.optimizer, state.parameters)
+    norm, before = optax.tree.norm(gradient), state.running_norm
+    changes, moments = optimizer(config.optimizer, config.steps).update(gradient, state.optimizer, state.parameters)
     parameters = optax.apply_updates(state.parameters, changes)
-    decay = jnp.minimum(config.average, (1 + state.step) / (10 + state.step))
+    decay = jnp.minimum(config.optimizer.average, (1 + state.step) / (10 + state.step))
     taken = state.replace(
         parameters=parameters,
         average=jax.tree.map(lambda a, p: (decay * a + (1 - decay) * p).astype(a.dtype), state.average, parameters),
         optimizer=moments,
-        usual=jnp.where(state.usual > 0, USUAL * state.usual + (1 - USUAL) * norm, norm),
+        running_norm=jnp.where(before > 0, _NORM_DECAY * before + (1 - _NORM_DECAY) * norm, norm),
         in_a_row=jnp.zeros_like(state.in_a_row),
     )
     refused = state.replace(skipped=state.skipped + 1, in_a_row=state.in_a_row + 1)
-    good = usual(norm, value, state.usual, guard)
+    good = _acceptable(norm, value, before, config.guard)
     state = jax.tree.map(lambda a, b: jnp.where(good, a, b), taken, refused)
     metrics = {"loss": value, "gradient": norm, "skipped": state.skipped, "in_a_row": state.in_a_row}
     return state.replace(step=state.step + 1), metrics
 
 
-def usual(norm: jax.Array, value: jax.Array, before: jax.Array, guard: GuardConfig) -> jax.Array:
-    """Whether a step may be taken: all is finite and, once the usual norm is known, nothing out of the common."""
+def _acceptable(norm: jax.Array, value: jax.Array, before: jax.Array, guard: GuardConfig) -> jax.Array:
+    """Whether a step may be taken: all is finite and the gradient not far above its running norm, once it has one."""
     return jnp.isfinite(norm) & jnp.isfinite(value) & ((before == 0) | (norm <= guard.spike * before))
 
 
@@ -94,7 +95,7 @@ def batch_gradient(loss: Loss, parameters: Any, batch: Any, total: Total) -> tup
 
     nothing = (jax.tree.map(jnp.zeros_like, parameters), jnp.zeros(()), jnp.zeros(()))
     # Summed after the gradient is taken: pmap's gradient of a psum is n times each device's own, and no sum.
-    if len(jax.tree.leaves(batch)[0]) == 1:  # XLA's CPU code is eight times slower inside a loop, even of one turn
+    if len(jax.tree.leaves(batch)[0]) == 1:  # XLA's CPU code is eight times slower inside a loop, even of one iteration
         sums, _ = add(nothing, jax.tree.map(lambda x: x[0], batch))
     else:
         sums, _ = jax.lax.scan(add, nothing, batch)

@@ -1,34 +1,40 @@
 """What happens beside the steps of a training run: its log, evaluations, checkpoints, and the end of the guard's
 patience."""
 
-import dataclasses
 import time
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 
 from experiments.config import dump_config
-from experiments.example_store import ExampleStore
 from experiments.train_restore.config import TrainConfig
-from experiments.train_restore.evaluate import evaluate
 from experiments.train_restore.guarded_step import TrainState
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.files.training_checkpoint import TrainingCheckpoints
 from rein3d_jax.io.files.training_log import TrainingLog
 from rein3d_jax.io.pictures.image import write_rgb
-from rein3d_jax.io.weights.restorer_weights import write_restorer
 from rein3d_jax.parallel import gather
 
 
-class TrainingRun:
-    """Counts the steps, and looks at the state when it is time. Only the first host writes; checkpoints are all
-    hosts' work. A context manager."""
+class HeldOut(NamedTuple):
+    """Result of a held-out evaluation."""
 
-    def __init__(self, config: TrainConfig, store: ExampleStore, checkpoints: TrainingCheckpoints, step: int):
-        self.config, self.store, self.checkpoints, self.step = config, store, checkpoints, step
+    score: float  # the higher, the better
+    figures: dict[str, float]  # for the log
+    picture: np.ndarray  # (h, w, 3) in [0, 1]
+    summary: str
+
+
+class TrainingRun:
+    """Counts the steps, and evaluates, logs and saves when it is time. Only the first host writes; checkpoints are all
+    hosts' work. A context manager; each network's own has `held_out` and `write_weights`, of averaged parameters."""
+
+    def __init__(self, config: TrainConfig, data: Any, checkpoints: TrainingCheckpoints, step: int):
+        self.config, self.data, self.checkpoints, self.step = config, data, checkpoints, step
         self.output, self.writes = Path(config.output), jax.process_index() == 0
         self.score, self.best = -np.inf, checkpoints.best_score()
         self.mark = (time.perf_counter(), step)
@@ -58,7 +64,8 @@ class TrainingRun:
         if values["in_a_row"] >= self.config.guard.patience:
             raise InputError(
                 f"{values['in_a_row']:.0f} steps in a row gave a gradient that is not finite or more than "
-                f"{self.config.guard.spike:g} times the usual; lower optimizer.rate and --resume from {self.output}"
+                f"{self.config.guard.spike:g} times its running norm; lower optimizer.rate and --resume from "
+                f"{self.output}"
             )
         now, (then, step) = time.perf_counter(), self.mark
         values["steps_per_second"] = (self.step - step) / max(now - then, 1e-9)
@@ -76,14 +83,30 @@ class TrainingRun:
         average, begun = gather(state.average), time.perf_counter()
         if not self.writes:
             return
-        values, grid = evaluate(self.store, average, self.config)
-        self.score = values["held_out_gain"]
-        self.log.record(self.step, values)
-        self.log.picture(self.step, "held_out", grid)
-        write_rgb(self.output / "samples" / f"{self.step:06d}.png", grid)
+        found = self.held_out(average)
+        self.score = found.score
+        self.log.record(self.step, found.figures)
+        self.log.picture(self.step, "held_out", found.picture)
+        write_rgb(self.output / "samples" / f"{self.step:06d}.png", found.picture)
         if self.score > self.best:
             self.best = self.score
-            write_restorer(self.output / "weights.npz", average, dataclasses.asdict(self.config.network))
+            self.write_weights(average)
         then, step = self.mark
         self.mark = (then + time.perf_counter() - begun, step)  # steps a second are the steps' alone
-        print(f"step {self.step}  held-out holes {values['held_out_psnr']:.2f} dB, {self.score:+.2f} over the fill")
+        print(f"step {self.step}  {found.summary}", flush=True)
+
+
+def clips_per_device(config: TrainConfig, devices: int) -> int:
+    """Clips of a part of a step's batch on each device. Raises InputError where they do not divide."""
+    clips, rest = divmod(config.batch // config.accumulate, devices)
+    if rest:
+        raise InputError(f"batch {config.batch} / accumulate {config.accumulate} does not divide by {devices} devices")
+    return clips
+
+
+def last_step(config: TrainConfig, checkpoints: TrainingCheckpoints, resume: bool) -> int | None:
+    """Step of the last checkpoint; None for a new run. Raises InputError where there is one but no `resume`."""
+    last = checkpoints.last()
+    if last is not None and not resume:
+        raise InputError(f"{config.output} holds a run of {last} steps: --resume it, or choose another output")
+    return last

@@ -20,7 +20,7 @@ from jax import lax
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.parallel.mesh import DATA, share_batch, spread
+from rein3d_jax.parallel.mesh import DATA, share_batch, state_shardings
 
 BACKENDS = ("jit", "pmap")
 Total = Callable[[Any], Any]
@@ -31,9 +31,9 @@ def data_parallel(
     step: Step, mesh: Mesh, *, backend: str = "jit", axis: int = 0, sharded: bool = False
 ) -> Callable[[Any, Any], tuple[Any, Any]]:
     """`step(state, batch, total) -> (state, result)` as `f(state, batch)`: the batch shared out along `axis`, state
-    and result on every device; or, `sharded`, the state laid out as `spread` does (fully sharded data parallelism: XLA
-    gathers what it needs when it needs it; only for jit). The state passed in is used up. The batch is this host's,
-    as NumPy arrays, and divides by its devices. Raises InputError for an unknown backend."""
+    and result on every device; or, `sharded`, the state laid out as by `state_shardings` (fully sharded data
+    parallelism: XLA gathers what it needs when it needs it; only for jit). The state passed in is used up. The batch
+    is this host's, as NumPy arrays, and divides by its devices. Raises InputError for an unknown backend."""
     if backend not in BACKENDS:
         raise InputError(f'backend "{backend}" is unknown; choose one of {", ".join(BACKENDS)}')
     if backend == "jit":
@@ -50,7 +50,7 @@ def _over_mesh(step: Step, mesh: Mesh, axis: int, sharded: bool):
     @cache
     def compiled(structure, shapes):
         state = jax.tree.unflatten(structure, [jax.ShapeDtypeStruct(shape, bool) for shape in shapes])
-        layout = spread(mesh, state) if sharded else everywhere
+        layout = state_shardings(mesh, state) if sharded else everywhere
         return jax.jit(
             partial(step, total=lambda x: x),
             in_shardings=(layout, shared),
@@ -77,5 +77,3 @@ def _over_replicas(step: Step, mesh: Mesh, axis: int):
         return np.moveaxis(array.reshape(shape), axis, 0)
 
     return lambda state, batch: run(state, jax.tree.map(split, batch))
-
-

@@ -11,12 +11,13 @@ from jax.sharding import AxisType, Mesh, NamedSharding, PartitionSpec
 from rein3d_jax.errors import InputError
 
 DATA = "data"  # the mesh's only axis: examples
-SMALL = 1024  # numbers in an array below which splitting it costs more than it saves
+_SMALL = 1024  # numbers in an array below which splitting it costs more than it saves
 
 
 def join_hosts(address: str | None, count: int | None, index: int | None) -> None:
-    """Let `count` processes train as one; `address` is "host:port" of process 0, `index` this one's number. With none
-    of them given nothing happens, and the job is one process's. Call it before anything else touches jax."""
+    """Joins `count` processes, so that they train as one; `address` is "host:port" of process 0, `index` this one's
+    number. With none of them given nothing happens, and the job is one process's. Call it before anything else touches
+    jax."""
     if (address, count, index) == (None, None, None):
         return
     if None in (address, count, index):
@@ -33,18 +34,18 @@ def data_mesh(devices: int = 0) -> Mesh:
 
 
 def share_batch(mesh: Mesh, batch: Any, axis: int = 0) -> Any:
-    """Arrays of THIS host's examples, along `axis`, as arrays of all hosts' examples laid over the mesh."""
+    """Arrays of all hosts' examples laid over the mesh, from those of THIS host, along `axis`."""
     sharding = NamedSharding(mesh, PartitionSpec(*[None] * axis, DATA))
     return jax.tree.map(lambda x: jax.make_array_from_process_local_data(sharding, np.asarray(x)), batch)
 
 
-def spread(mesh: Mesh, tree: Any) -> Any:
-    """How a tree of arrays is split over the mesh: each along its longest axis that the devices divide. What has none,
-    or fewer than SMALL numbers, is on every device."""
+def state_shardings(mesh: Mesh, tree: Any) -> Any:
+    """Shardings of a tree of arrays over the mesh: each along its longest axis that the devices divide. What has none,
+    or fewer than _SMALL numbers, is on every device."""
 
     def layout(array) -> NamedSharding:
         fitting = [axis for axis, size in enumerate(array.shape) if size % mesh.size == 0]
-        if not fitting or math.prod(array.shape) < SMALL:
+        if not fitting or math.prod(array.shape) < _SMALL:
             return NamedSharding(mesh, PartitionSpec())
         longest = max(fitting, key=lambda axis: array.shape[axis])
         return NamedSharding(mesh, PartitionSpec(*[None] * longest, DATA))
@@ -53,7 +54,7 @@ def spread(mesh: Mesh, tree: Any) -> Any:
 
 
 def gather(tree: Any) -> Any:
-    """Arrays laid over the devices of all hosts, whole, as NumPy's. All hosts' work where they are split."""
+    """NumPy arrays, whole, of those laid over the devices of all hosts. All hosts must call it where they are split."""
     return jax.tree.map(lambda x: _whole(x) if isinstance(x, jax.Array) else x, tree)
 
 

@@ -1,10 +1,10 @@
 """Degraded RGB-alpha video -> clean video. A restorer is `(Video, key) -> Video`; `restorer(config)` names one.
 
-Every restorer keeps what was observed (alpha near 1) as it was, and returns colour AND distance for the rest, with
-alpha still saying what was observed: a restored pixel is a guess, and who uses it may weigh it as one.
+Every restorer returns what was observed (alpha near 1) as it was, and colour AND distance for the rest, with alpha
+still saying what was observed: a restored pixel is a guess, and its user may weigh it as one.
 """
 
 from rein3d_jax.restore.background import Background, background_of
-from rein3d_jax.restore.restorer import Network, RestoreConfig, restorer
+from rein3d_jax.restore.restorer import RestoreConfig, Restorer, TrainedNetwork, restorer
 
-__all__ = ["Background", "Network", "RestoreConfig", "background_of", "restorer"]
+__all__ = ["Background", "RestoreConfig", "Restorer", "TrainedNetwork", "background_of", "restorer"]

@@ -1,4 +1,4 @@
-"""Our own fill until the network lands: the background, from the FARTHER side of a hole.
+"""The background fill: a hole takes what lies on its FARTHER side.
 
 A hole that opens when the camera moves shows what an object hid, so it belongs to the background, not to the
 object beside it. Cracks between splats of one surface are closed first, from all sides. Then
@@ -35,7 +35,8 @@ class Background:
 
 @jax.jit
 def background_of(panorama: Panorama, shell: RoomShell) -> Background:
-    """The shell with each face's mean colour; a face that was not seen at all takes the whole panorama's."""
+    """The shell with the mean colour of each face in `panorama`; a face that was not seen takes the whole
+    panorama's."""
     height, width = panorama.distance.shape
     distance, face = meet_shell(shell, jnp.zeros(3), pixel_rays(height, width))
     area = pixel_solid_angles(height, width)
@@ -47,7 +48,8 @@ def background_of(panorama: Panorama, shell: RoomShell) -> Background:
 
 
 def restore_background(video: Video, *, observed: float, background: Background | None = None) -> Video:
-    """Fill every pixel of alpha below `observed`; the others stay to the bit. Frames are filled one by one."""
+    """The video with every pixel of alpha below `observed` filled; the others stay to the bit. Frames are filled one by
+    one."""
     known = video.alpha >= observed
     # One program a frame, not a scan over them: trajectories differ in length, and each length would compile anew.
     frames = zip(video.rgb, video.distance, known, video.world_from_camera, strict=True)
@@ -61,7 +63,7 @@ def restore_background(video: Video, *, observed: float, background: Background 
 
 @jax.jit
 def fill_from_far_side(rgb: jax.Array, distance: jax.Array, known: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """(h, w, 3), (h, w) metres, (h, w) bool -> filled colour and distance. A frame that knows nothing stays."""
+    """Filled colour and distance of a frame (h, w, 3), (h, w) metres, (h, w) bool; one without known pixels stays."""
     known = known & (distance > 0)
     inverse = jnp.where(known, 1 / jnp.where(known, distance, 1.0), 0.0)
     image = jnp.where(known[..., None], jnp.concatenate([rgb, inverse[..., None]], axis=-1), 0.0)
@@ -78,13 +80,14 @@ def fill_from_far_side(rgb: jax.Array, distance: jax.Array, known: jax.Array) ->
 def fill_from_shell(
     rgb: jax.Array, distance: jax.Array, known: jax.Array, world_from_camera: jax.Array, background: Background
 ) -> tuple[jax.Array, jax.Array]:
-    """As `fill_from_far_side`, for a frame taken at `world_from_camera` (4, 4) inside a room of known shell."""
+    """Filled colour and distance, as `fill_from_far_side`'s, of a frame at `world_from_camera` (4, 4) inside a room of
+    known shell."""
     known = known & (distance > 0)
     image = jnp.where(known[..., None], jnp.concatenate([rgb, distance[..., None]], axis=-1), 0.0)
     image, solid = _close_cracks(image, known)
     rays = rays_of_pose(world_from_camera, *distance.shape)
-    reach, face = meet_shell(background.shell, world_from_camera[:3, 3], rays)
-    shows = solid & (jnp.abs(image[..., 3] / jnp.maximum(reach, 1e-6) - 1) < ON_FACE)
+    wall, face = meet_shell(background.shell, world_from_camera[:3, 3], rays)
+    shows = solid & (jnp.abs(image[..., 3] / jnp.maximum(wall, 1e-6) - 1) < ON_FACE)
 
     def fill_face(index, colour):
         source = (shows & (face == index)).astype(jnp.float32)
@@ -92,12 +95,12 @@ def fill_from_shell(
 
     faces = jax.vmap(fill_face)(jnp.arange(FACES), background.rgb)
     chosen = jnp.take_along_axis(faces, face[None, ..., None], axis=0)[0]
-    filled = jnp.where(solid[..., None], image, jnp.concatenate([chosen, reach[..., None]], axis=-1))
+    filled = jnp.where(solid[..., None], image, jnp.concatenate([chosen, wall[..., None]], axis=-1))
     return jnp.where(known[..., None], rgb, filled[..., :3]), jnp.where(known, distance, filled[..., 3])
 
 
 def _close_cracks(image, known):
-    """Holes inside a morphological closing of `known` take the mean of what is known within CRACK pixels."""
+    """(image, closing of `known`): holes inside the closing take the mean of what is known within CRACK pixels."""
     weight = known.astype(jnp.float32)
     closed = closing(known, CRACK)
     mean = window_sum(image * weight[..., None], CRACK) / jnp.maximum(window_sum(weight, CRACK), 1e-6)[..., None]

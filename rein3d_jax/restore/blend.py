@@ -1,5 +1,5 @@
-"""What was observed returns as it was rendered, and the guesses beside it take its colours; for every restorer that
-redraws whole frames. Without it, colours drift from pass to pass.
+"""The blend of a redrawn clip with what was rendered: observed pixels return, and the guesses beside them take their
+colours. Without it, colours drift from pass to pass of a restorer that redraws whole frames.
 
     out = w rendered + (1 - w) (gain restored + shift),     w = 0 up to alpha `observed`, 1 from TRUSTED
 
@@ -17,20 +17,21 @@ DAMPING = 3.0  # pixels' worth of belief that the colours need no change, for cl
 
 
 def blend(restored: jax.Array, rendered: jax.Array, alpha: jax.Array, *, observed: float) -> jax.Array:
-    """sRGB (t, h, w, 3) in [0, 1] of a clip that a restorer redrew, and of the clip as it was, alpha (t, h, w)."""
+    """sRGB (t, h, w, 3) in [0, 1]: `restored` by a restorer that redraws all, colours matched to the `rendered` clip's,
+    whose pixels return where alpha (t, h, w) says that they were observed."""
     matched = jnp.clip(match_colours(restored, rendered, observed_share(alpha, observed)), 0.0, 1.0)
     return keep_observed(matched, rendered, alpha, observed=observed)
 
 
 def keep_observed(restored: jax.Array, rendered: jax.Array, alpha: jax.Array, *, observed: float) -> jax.Array:
-    """The same, colours taken as they are: for a restorer that redraws holes alone."""
+    """`blend` without matching colours: for a restorer that redraws holes alone."""
     share = observed_share(alpha, observed)
     mixed = restored + share[..., None] * (rendered - restored)
     return jnp.where(share[..., None] == 1, rendered, mixed)  # 1 - w and w do not sum to 1 to the bit
 
 
 def observed_share(alpha: jax.Array, observed: float) -> jax.Array:
-    """w: how much of a pixel is to stay as it was rendered; a step where `observed` is TRUSTED or more."""
+    """w in [0, 1]: how much of a pixel stays as it was rendered; a step where `observed` is TRUSTED or more."""
     if observed >= TRUSTED:
         return (alpha >= observed).astype(alpha.dtype)
     return jnp.where(alpha >= TRUSTED, 1.0, jnp.clip((alpha - observed) / (TRUSTED - observed), 0.0, 1.0))

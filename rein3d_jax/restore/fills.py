@@ -1,4 +1,4 @@
-"""The classical fills that any user would reach for: OpenCV's inpainting, frame by frame, and none at all.
+"""OpenCV's inpainting, frame by frame, and no fill at all.
 
 They know nothing of depth: colour and distance are inpainted alike, from all sides of a hole. The only wrap they
 get is a margin of the picture's other edge.
@@ -11,22 +11,22 @@ import numpy as np
 from rein3d_jax.geometry.resample import pad_sphere
 from rein3d_jax.scene import Video
 
-RADIUS = 3  # pixels, the value of OpenCV's own examples
-MARGIN = 16  # pixels of the other edge shown on each side, so that the seam is not a border
+_RADIUS = 3  # pixels, the value of OpenCV's own examples
+_MARGIN = 16  # pixels of the other edge shown on each side, so that the seam is not a border
 
 
 def restore_none(video: Video, *, observed: float, background=None) -> Video:
-    """The video as it is, holes and all."""
+    """The video as it is, with its holes."""
     return video
 
 
 def restore_telea(video: Video, *, observed: float, background=None) -> Video:
-    """Telea 2004, fast marching from the hole's rim."""
+    """Inpainting by fast marching from the hole's rim (Telea 2004)."""
     return _inpaint(video, observed, cv2.INPAINT_TELEA)
 
 
 def restore_navier_stokes(video: Video, *, observed: float, background=None) -> Video:
-    """Bertalmio et al. 2001, isophotes carried into the hole."""
+    """Inpainting that carries isophotes into the hole (Bertalmio et al. 2001)."""
     return _inpaint(video, observed, cv2.INPAINT_NS)
 
 
@@ -38,13 +38,13 @@ def _inpaint(video: Video, observed: float, method: int) -> Video:
 
 
 def _inpaint_frame(rgb, distance, hole, method):
-    padded = [np.asarray(pad_sphere(jnp.asarray(x), MARGIN)) for x in (rgb, distance, hole)]
+    padded = [np.asarray(pad_sphere(jnp.asarray(x), _MARGIN)) for x in (rgb, distance, hole)]
     mask = padded[2].astype(np.uint8)
-    colour = cv2.inpaint((np.clip(padded[0], 0, 1) * 255).round().astype(np.uint8), mask, RADIUS, method) / 255.0
+    colour = cv2.inpaint((np.clip(padded[0], 0, 1) * 255).round().astype(np.uint8), mask, _RADIUS, method) / 255.0
     # 16 bit, because the float path of OpenCV 5 leaves a checkered pattern of wrong values in Telea holes.
     unit = max(float(padded[1].max()), 1e-6) / 65535
-    depth = cv2.inpaint((padded[1] / unit).round().astype(np.uint16), mask, RADIUS, method) * unit
-    inner = (slice(MARGIN, -MARGIN), slice(MARGIN, -MARGIN))
+    depth = cv2.inpaint((padded[1] / unit).round().astype(np.uint16), mask, _RADIUS, method) * unit
+    inner = (slice(_MARGIN, -_MARGIN), slice(_MARGIN, -_MARGIN))
     rgb = np.where(hole[..., None], colour[inner], rgb).astype(np.float32)
     # Fast marching extrapolates slopes and may leave the range of what it read.
     low, high = distance[~hole].min(initial=np.inf), distance[~hole].max(initial=0.0)

@@ -14,15 +14,10 @@ from rein3d_jax.errors import InputError
 
 
 def draw_noise(key: jax.Array, shape: tuple[int, ...], *, kind: str = "latitude") -> jax.Array:
-    """(..., h, w, c) float32 at latent resolution; rows are latitudes. Raises InputError for an unknown kind."""
-    require_kind("noise", kind)
-    return KINDS[kind](key, shape)
-
-
-def require_kind(setting: str, kind: str) -> None:
-    """Raises InputError, naming the `setting`, for an unknown kind of noise."""
-    if kind not in KINDS:
-        raise InputError(f'{setting} "{kind}" is unknown; choose one of {", ".join(KINDS)}')
+    """Noise (..., h, w, c) float32 at latent resolution; rows are latitudes. Raises InputError for an unknown kind."""
+    if kind not in NOISES:
+        raise InputError(f'noise "{kind}" is unknown; choose one of {", ".join(NOISES)}')
+    return NOISES[kind](key, shape)
 
 
 def white_noise(key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
@@ -33,8 +28,8 @@ def white_noise(key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
 def latitude_noise(key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
     """N(0, 1), correlated over w / round(w cos(latitude)) columns, alike all around.
 
-    A row of as many samples as columns stays white; any other is turned by a random phase, or the columns that fall
-    on samples would tell where the seam is.
+    A row of as many samples as columns stays white; any other is shifted by a random phase, or the columns that fall
+    on samples would give away the seam.
     """
     height, width = shape[-3:-1]
     counts = np.maximum(np.round(width * _row_cosines(height)), 2).astype(int)[:, None, None]
@@ -59,7 +54,7 @@ def paper_noise(key: jax.Array, shape: tuple[int, ...]) -> jax.Array:
     return _along_rows(white, near) * (1 - share) + _along_rows(white, near + 1) * share
 
 
-KINDS = {"latitude": latitude_noise, "white": white_noise, "paper": paper_noise}
+NOISES = {"latitude": latitude_noise, "white": white_noise, "paper": paper_noise}  # the kinds, by name
 
 
 def _row_cosines(height):

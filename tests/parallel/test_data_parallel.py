@@ -12,12 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from experiments.train_restore.config import TrainConfig
 from experiments.train_restore.guarded_step import batch_gradient
-from experiments.train_restore.step import Batch, examples_loss
+from experiments.train_restore.learned.config import LearnedTrainConfig
+from experiments.train_restore.learned.step import ExampleBatch, examples_loss
 from rein3d_jax.errors import InputError
 from rein3d_jax.parallel import BACKENDS, data_mesh, data_parallel, gather, join_hosts, share_batch
-from rein3d_jax.restore.learned.condition import FILLS, Clip
+from rein3d_jax.restore.learned.condition import CANDIDATES, Clip
 from rein3d_jax.restore.learned.config import NetworkConfig
 from rein3d_jax.restore.learned.loss import Example
 from rein3d_jax.restore.learned.network import initial_parameters
@@ -25,7 +25,7 @@ from rein3d_jax.restore.learned.network import initial_parameters
 DEVICES = 8
 ROOT = Path(__file__).parents[2]
 NETWORK = NetworkConfig(rows=16, fine=8, width=8, depth=1, heads=1, expand=1)
-LEARNED = TrainConfig(network=NETWORK)
+LEARNED = LearnedTrainConfig(network=NETWORK)
 LINE = {"a": np.float32([1.0, 2.0]), "b": np.array(3.0, np.float32)}
 POINTS = np.random.default_rng(0).normal(size=(8, 2)).astype(np.float32)
 
@@ -48,7 +48,7 @@ def gradient(loss, parameters, batch, total):
     return parameters, batch_gradient(loss, parameters, batch, total)[0]
 
 
-def learned_batch(parts) -> Batch:
+def learned_batch(parts) -> ExampleBatch:
     """8 random examples, each with randomness of its own."""
     rng = np.random.default_rng(0)
 
@@ -56,9 +56,9 @@ def learned_batch(parts) -> Batch:
         return rng.random((parts, DEVICES // parts, 2, 16, 32, *channels), np.float32)
 
     position = rng.normal(size=(parts, DEVICES // parts, 2, 3)).astype(np.float32)
-    clip = Clip(values(3), values(), 1 + values(), values(FILLS, 3), 1 + values(FILLS), position)
+    clip = Clip(values(3), values(), 1 + values(), values(CANDIDATES, 3), 1 + values(CANDIDATES), position)
     seeds = rng.integers(0, 2**32, (parts, DEVICES // parts, 2), np.uint32)
-    return Batch(Example(clip, values(3), 1 + values()), seeds)
+    return ExampleBatch(Example(clip, values(3), 1 + values()), seeds)
 
 
 def run_here(*arguments, flags="") -> subprocess.Popen:
@@ -72,8 +72,8 @@ def run_here(*arguments, flags="") -> subprocess.Popen:
 def succeed(processes) -> None:
     try:
         for process in processes:
-            _, told = process.communicate(timeout=240)
-            assert process.returncode == 0, told[-2000:]
+            _, error = process.communicate(timeout=240)
+            assert process.returncode == 0, error[-2000:]
     finally:
         for process in processes:
             process.kill()

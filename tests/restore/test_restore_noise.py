@@ -80,7 +80,7 @@ def test_the_papers_warp_to_the_letter_loses_variance_and_tears_at_the_seam():
 
 
 def test_an_unknown_kind_is_refused_by_name():
-    with pytest.raises(InputError, match="pink"):
+    with pytest.raises(InputError, match='"pink" is unknown; choose one of latitude'):
         draw_noise(jax.random.key(0), (2, 4, 1), kind="pink")
 
 

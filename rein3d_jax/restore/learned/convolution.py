@@ -6,13 +6,13 @@ import jax.numpy as jnp
 
 
 def wrap(grid: jax.Array) -> jax.Array:
-    """(n, h, w, c) -> (n, h + 2, w + 2, c)."""
+    """Grid (n, h + 2, w + 2, c) of (n, h, w, c), padded by the neighbours on the sphere."""
     wide = jnp.concatenate([grid[:, :, -1:], grid, grid[:, :, :1]], axis=2)
     return jnp.concatenate([wide[:, :1], wide, wide[:, -1:]], axis=1)
 
 
 def fold(grid: jax.Array, size: int) -> jax.Array:
-    """(n, h, w, c) -> (n, h / size, w / size, size^2 c): the pixels of a block become channels."""
+    """Grid (n, h / size, w / size, size^2 c) of (n, h, w, c): the pixels of a block become channels."""
     n, h, w, c = grid.shape
     blocks = grid.reshape(n, h // size, size, w // size, size, c)
     return jnp.moveaxis(blocks, 2, 3).reshape(n, h // size, w // size, size * size * c)
@@ -26,7 +26,7 @@ def unfold(grid: jax.Array, size: int) -> jax.Array:
 
 
 class Conv(nn.Module):
-    """3 x 3, seam-exact."""
+    """3 x 3 convolution, seam-exact."""
 
     features: int
     init: nn.initializers.Initializer = nn.initializers.lecun_normal()

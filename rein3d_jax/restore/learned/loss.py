@@ -1,52 +1,52 @@
-"""What the network is trained for. x-prediction at noise level s of a straight path (flow matching):
+"""The learned restorer's objective: x-prediction at noise level s of a straight path (flow matching):
 
     x_s = (1 - s) x_0 + s e,     loss = |x_0(x_s, s) - x_0|, weighted
 
 where x_0 is what the fills' mean is wrong by, in colour and in the distance's logarithm.
 """
 
-import dataclasses
+from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
 from flax import struct
 
-from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.sphere import latitudes
 from rein3d_jax.restore.learned.condition import Clip, log_distance
 from rein3d_jax.restore.learned.mixture import base
 from rein3d_jax.restore.noise import draw_noise
+from rein3d_jax.settings import Settings, setting
 
-FLOOR = 1e-3  # mean penalty of a pixel below which an example has nothing left to learn from
+_FLOOR = 1e-3  # mean penalty of a pixel below which an example has nothing left to learn from
 NOISE = 0.2  # standard deviation of e, about that of x_0 in holes
 
 
 @struct.dataclass
 class Example:
-    """A clip and what it should have been."""
+    """A clip and its ground truth."""
 
     clip: Clip
     clean_rgb: jax.Array  # (..., t, h, w, 3) sRGB
     clean_distance: jax.Array  # (..., t, h, w) metres, 0 where unknown
 
 
-@dataclasses.dataclass(frozen=True)
-class LossConfig:
-    latitude: float = 0.1  # lambda of W(phi) = lambda + (1 - lambda) cos(phi): the weight left at the poles (Sec. 4.2)
-    observed: float = 0.0  # weight of a pixel that was observed, against 1 in a hole
-    distance: float = 0.1  # weight of the distance's logarithm beside colour
-    gradient: float = 0.05  # weight of differences between neighbouring pixels of a hole
-    knee: float = 0.25  # errors well below it count by their square, as PSNR does, above it by themselves
+@dataclass(frozen=True)
+class LossConfig(Settings):
+    """Weights of the learned restorer's loss."""
 
-    def __post_init__(self):
-        if not 0 <= self.latitude <= 1:
-            raise InputError(f"loss.latitude {self.latitude} must lie between 0 and 1")
-        if min(self.observed, self.distance, self.gradient) < 0 or self.knee <= 0:
-            raise InputError("loss: weights must not be negative, and loss.knee must be above 0")
+    latitude: float = setting(
+        0.1, "lambda of W = lambda + (1 - lambda) cos(latitude): the weight left at the poles", within="[0, 1]"
+    )
+    observed: float = setting(0.0, "weight of a pixel that was observed, against 1 in a hole", within="[0, 1]")
+    distance: float = setting(0.1, "weight of the distance's logarithm beside colour", within="[0, inf)")
+    gradient: float = setting(0.05, "weight of differences between neighbouring pixels of a hole", within="[0, inf)")
+    knee: float = setting(
+        0.25, "errors well below it count by their square, as in PSNR, above it by themselves", within="(0, inf)"
+    )
 
 
-def residual(example: Example) -> jax.Array:
-    """(..., t, h, w, 4): x_0, what has to be added to the fills' mean."""
+def clean_residual(example: Example) -> jax.Array:
+    """x_0 (..., t, h, w, 4), what has to be added to the fills' mean: sRGB and the distance's logarithm."""
     start = base(example.clip)
     known = example.clean_distance > 0
     depth = jnp.where(known, log_distance(example.clean_distance), start[..., 3])
@@ -54,7 +54,7 @@ def residual(example: Example) -> jax.Array:
 
 
 def pixel_weights(alpha: jax.Array, config: LossConfig) -> jax.Array:
-    """(..., t, h, w): holes before what was observed, the horizon before the poles, and nothing for the anchor."""
+    """Weights (..., t, h, w): holes above what was observed, the horizon above the poles, and 0 for the anchor."""
     row = latitudes(alpha.shape[-2])[:, None]
     latitude = config.latitude + (1 - config.latitude) * jnp.cos(row)
     open_ = jnp.clip((0.9 - alpha) / 0.4, 0.0, 1.0)  # the share that the blend leaves to the network
@@ -63,13 +63,13 @@ def pixel_weights(alpha: jax.Array, config: LossConfig) -> jax.Array:
 
 
 def restoration_loss(predicted: jax.Array, example: Example, config: LossConfig) -> tuple[jax.Array, jax.Array]:
-    """Examples (b, t, h, w) -> (sum over them of the error over the fills' mean's own, b): 1 each at the start. Every
+    """Sum over examples (b, t, h, w) of the error over the error of the fills' mean, 1 each at the start, and b. Every
     room counts alike, as in a mean of decibels, however much of it is hidden.
 
     Divide after both are summed over the whole batch, and a batch in parts has the gradient of the whole."""
-    wanted, weights = residual(example), pixel_weights(example.clip.alpha, config)
+    wanted, weights = clean_residual(example), pixel_weights(example.clip.alpha, config)
     mine, fills = (_weighted(error, weights, config) for error in (predicted - wanted, wanted))
-    floor = FLOOR * jnp.sum(weights, axis=(1, 2, 3)) + 1e-3
+    floor = _FLOOR * jnp.sum(weights, axis=(1, 2, 3)) + 1e-3
     return jnp.sum((mine + floor) / (fills + floor)), jnp.float32(len(weights))
 
 
@@ -91,11 +91,13 @@ def _penalty(error: jax.Array, knee: float) -> jax.Array:
     return jnp.sqrt(error**2 + knee**2) - knee
 
 
-def noised(key: jax.Array, example: Example, share: float, kind: str = "latitude") -> tuple[jax.Array, jax.Array]:
+def noisy_residual(
+    key: jax.Array, example: Example, share: float, kind: str = "latitude"
+) -> tuple[jax.Array, jax.Array]:
     """x_s of one example, with noise of a `kind` of restore/noise.py, and its level s: uniform for `share` of the
-    examples, 1 for the others. At level 1 nothing of x_0 is left, so nothing is shown: the network then gives the
+    examples, 1 for the others. At level 1 nothing of x_0 is left, so 0 is shown: the network then gives the
     conditional mean, which one step needs."""
-    wanted = residual(example)
+    wanted = clean_residual(example)
     if share == 0:
         return jnp.zeros_like(wanted), jnp.ones(())
     choose, draw, dots = jax.random.split(key, 3)

@@ -8,10 +8,10 @@ import jax.numpy as jnp
 from rein3d_jax.restore.background import Background
 from rein3d_jax.restore.blend import keep_observed
 from rein3d_jax.restore.learned.candidates import clip_of
-from rein3d_jax.restore.learned.sample import Learned, sample
+from rein3d_jax.restore.learned.sample import Learned, sample_clip
 from rein3d_jax.scene import Video
 
-GROUP = 4  # frames: a clip is made up to a multiple of it, so that few lengths are compiled
+_GROUP = 4  # frames: a clip is made up to a multiple of it, so that few lengths are compiled
 
 
 def restore_learned(
@@ -23,18 +23,19 @@ def restore_learned(
     background: Background | None = None,
     steps: int = 1,
 ) -> Video:
-    """A restorer once all keywords are bound. Frame 0 is the anchor; rows are learned.config.rows times a power of 2.
+    """The restored video: a restorer once all keywords are bound. Frame 0 is the anchor; rows are learned.config.rows
+    times a power of 2.
 
     The colour of every pixel of alpha below `observed` is the network's; those above return as rendered, up to a soft
     border. Distance is the background fill's: the network mixes surfaces at a hole's edges, and what is lifted there
     floats (distance error of the refined scene 0.157 against 0.077, mean of 8 rooms).
 
-    One step gives the mean of what may be there and uses no randomness; more of them draw a sample,
-    from a network that was trained with noise.
+    One sampler step gives the mean of what may be there and uses no randomness; more of them draw a sample, from a
+    network that was trained with noise.
     """
     clip = clip_of(video, observed=observed, background=background)
-    padded = jax.tree.map(partial(_padded, count=-len(clip.alpha) % GROUP), clip)
-    drawn = sample(key, learned, padded, steps)[: len(clip.alpha)]
+    padded = jax.tree.map(partial(_padded, count=-len(clip.alpha) % _GROUP), clip)
+    drawn = sample_clip(key, learned, padded, steps)[: len(clip.alpha)]
     rgb = keep_observed(jnp.clip(drawn[..., :3], 0.0, 1.0), video.rgb, video.alpha, observed=observed)
     return video.replace(rgb=rgb, distance=clip.fill_distance[..., 0])
 

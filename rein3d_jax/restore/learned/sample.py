@@ -1,4 +1,4 @@
-"""From noise to a clip: a few steps of a trained network."""
+"""The learned restorer's sampler: from noise to a clip in a few steps."""
 
 from itertools import pairwise
 
@@ -16,14 +16,14 @@ from rein3d_jax.restore.noise import draw_noise
 
 @struct.dataclass
 class Learned:
-    """A trained network."""
+    """A trained network of the learned restorer."""
 
     parameters: dict
     config: NetworkConfig = struct.field(pytree_node=False)
 
 
-def sample(key: jax.Array, learned: Learned, clip: Clip, steps: int) -> jax.Array:
-    """(t, h, w, 4) of a clip (t, h, w): sRGB, not clipped, and the distance's logarithm; down the straight path of
+def sample_clip(key: jax.Array, learned: Learned, clip: Clip, steps: int) -> jax.Array:
+    """sRGB, not clipped, and the distance's logarithm, (t, h, w, 4), of a clip (t, h, w): down the straight path of
     loss.py from noise level 1 to 0. One step gives the mean of what may be there, whatever the key; more of them draw
     from it, if the network was trained with noise."""
     start = base(clip)
@@ -38,6 +38,6 @@ def sample(key: jax.Array, learned: Learned, clip: Clip, steps: int) -> jax.Arra
 
 @jax.jit
 def _clean(learned: Learned, clip: Clip, noisy: jax.Array, level: jax.Array) -> jax.Array:
-    shown = jnp.where(level < 1, noisy, 0.0)  # at level 1 nothing is left of what is looked for
+    shown = jnp.where(level < 1, noisy, 0.0)  # at level 1 nothing of x_0 is left
     clips = jax.tree.map(lambda x: x[None], clip)
     return predict(learned.parameters, clips, shown[None], level[None], config=learned.config)[0]

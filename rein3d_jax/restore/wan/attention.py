@@ -7,14 +7,14 @@ import jax.numpy as jnp
 
 
 def rms_norm(x: jax.Array, scale: jax.Array, epsilon: float) -> jax.Array:
-    """x / sqrt(mean(x^2) + epsilon) * scale over the last axis. Wan takes it over ALL heads at once."""
+    """Norm x / sqrt(mean(x^2) + epsilon) * scale over the last axis. Wan takes it over ALL heads at once."""
     wide = x.astype(_accumulator(x))
     mean = jnp.mean(jnp.square(wide), axis=-1, keepdims=True)
     return (wide * jax.lax.rsqrt(mean + epsilon) * scale).astype(x.dtype)
 
 
 def layer_norm(x: jax.Array, epsilon: float) -> jax.Array:
-    """(x - mean) / sqrt(variance + epsilon) over the last axis, without parameters; stays in float32."""
+    """Norm (x - mean) / sqrt(variance + epsilon) over the last axis, without parameters; stays in float32."""
     wide = x.astype(_accumulator(x))
     centred = wide - wide.mean(axis=-1, keepdims=True)
     return centred * jax.lax.rsqrt(jnp.square(centred).mean(axis=-1, keepdims=True) + epsilon)
@@ -23,7 +23,7 @@ def layer_norm(x: jax.Array, epsilon: float) -> jax.Array:
 def attend(
     query: jax.Array, key: jax.Array, value: jax.Array, *, kernel: str = "chunked", chunk: int = 1024
 ) -> jax.Array:
-    """softmax(q k^T / sqrt(d)) v: queries (b, n, h, d), keys and values (b, m, h, d) -> (b, n, h, d).
+    """Attention softmax(q k^T / sqrt(d)) v: queries (b, n, h, d), keys and values (b, m, h, d) -> (b, n, h, d).
 
     "chunked" takes `chunk` queries at a time and recomputes their logits in the backward pass, so that memory grows
     as chunk * m; the other kernels are those of jax.nn.dot_product_attention.

@@ -1,53 +1,56 @@
-"""Sizes and switches of the full-size network, as frozen configs; a preset is a config with a name.
+"""Sizes and switches of the full-size network; a preset is a config with a name.
 
 The defaults are Wan2.1-VACE-1.3B (Wan 2025; VACE 2025). One code path serves every size.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from rein3d_jax.errors import InputError
+from rein3d_jax.settings import Settings, setting
 
 DTYPES = ("float32", "bfloat16", "float64")  # the last for comparisons, under jax.enable_x64
 KERNELS = ("chunked", "xla", "cudnn")
-
-
-def _check(part: str, *dtypes: str) -> None:
-    for dtype in dtypes:
-        if dtype not in DTYPES:
-            raise InputError(f'{part} dtype "{dtype}" is unknown; choose one of {", ".join(DTYPES)}')
+_SIZE = "[1, inf)"
 
 
 @dataclass(frozen=True)
-class DitConfig:
-    heads: int = 12
-    head_dim: int = 128
-    ffn: int = 8960
-    depth: int = 30  # main blocks
-    control_every: int = 2  # main blocks from one control hint to the next, the first at block 0; 0 for no control
-    channels: int = 16  # of the latents
-    control_channels: int = 96
-    text_dim: int = 4096
-    frequencies: int = 256  # of the embedded timestep
-    patch: tuple[int, int, int] = (1, 2, 2)
-    epsilon: float = 1e-6
-    circular: bool = False  # width RoPE of integer harmonics: a yaw of whole tokens becomes an exact symmetry
-    dtype: str = "bfloat16"  # of the large matrix products; norms, modulation and rotation stay in float32
-    param_dtype: str = "float32"
-    remat: bool = False  # recompute each block in the backward pass
-    kernel: str = "chunked"  # chunked runs anywhere; cudnn is the fused kernel of NVIDIA devices, bfloat16 alone
-    query_chunk: int = 1024  # queries at once in the chunked attention
+class DitConfig(Settings):
+    """Sizes and switches of the diffusion transformer."""
+
+    heads: int = setting(12, "of the attention", within=_SIZE)
+    head_dim: int = setting(128, "channels of a head, an even number: RoPE rotates pairs on 3 axes", within="[6, inf)")
+    ffn: int = setting(8960, "channels of a block's hidden layer", within=_SIZE)
+    depth: int = setting(30, "main blocks", within=_SIZE)
+    control_every: int = setting(
+        2, "main blocks from one control hint to the next, the first at block 0; 0: no control", within="[0, inf)"
+    )
+    channels: int = setting(16, "of the latents", within=_SIZE)
+    control_channels: int = setting(96, "of the control's latents", within=_SIZE)
+    text_dim: int = setting(4096, "channels of the embedded text", within=_SIZE)
+    frequencies: int = setting(256, "of the embedded timestep, an even number", within="[2, inf)")
+    patch: tuple[int, int, int] = setting((1, 2, 2), "latents of a token in time, height and width", within=_SIZE)
+    epsilon: float = setting(1e-6, "of the norms", within="(0, inf)")
+    circular: bool = setting(False, "width RoPE of integer harmonics: a yaw of whole tokens becomes an exact symmetry")
+    dtype: str = setting(
+        "bfloat16", "of the large matrix products; norms, modulation and rotation stay in float32", among=DTYPES
+    )
+    param_dtype: str = setting("float32", "of the parameters", among=DTYPES)
+    remat: bool = setting(False, "recompute each block in the backward pass, for memory")
+    kernel: str = setting(
+        "chunked", "of the attention: chunked runs anywhere; cudnn on NVIDIA devices, in bfloat16", among=KERNELS
+    )
+    query_chunk: int = setting(1024, "queries at once in the chunked attention", within=_SIZE)
 
     def __post_init__(self):
+        super().__post_init__()
         if self.control_every and self.depth % self.control_every:
-            raise InputError(f"dit.depth {self.depth} must be a multiple of dit.control_every {self.control_every}")
-        if self.head_dim % 2 or self.head_dim < 6:
-            raise InputError(f"dit.head_dim {self.head_dim} must be even and at least 6: RoPE turns pairs on 3 axes")
-        _check("dit", self.dtype, self.param_dtype)
-        if self.kernel not in KERNELS:
-            raise InputError(f'dit.kernel "{self.kernel}" is unknown; choose one of {", ".join(KERNELS)}')
+            raise InputError(f"depth must be a multiple of control_every ({self.control_every}), not {self.depth}")
+        if self.head_dim % 2 or self.frequencies % 2:
+            raise InputError(f"head_dim and frequencies must be even, not {self.head_dim} and {self.frequencies}")
 
     @property
     def width(self) -> int:
+        """Channels of a token."""
         return self.heads * self.head_dim
 
     @property
@@ -57,19 +60,25 @@ class DitConfig:
 
 
 @dataclass(frozen=True)
-class VaeConfig:
-    base: int = 96
-    multipliers: tuple[int, ...] = (1, 2, 4, 4)
-    blocks: int = 2  # residual blocks a stage in the encoder; the decoder has one more
-    halve_time: tuple[bool, ...] = (False, True, True)  # at each of the encoder's downsamplings
-    circular: bool = False  # pad the width with the other edge: exactly yaw-equivariant
-    dtype: str = "float32"
-    param_dtype: str = "float32"
+class VaeConfig(Settings):
+    """Sizes and switches of the VAE."""
+
+    base: int = setting(96, "channels at full resolution", within=_SIZE)
+    multipliers: tuple[int, ...] = setting((1, 2, 4, 4), "channels of each stage over the base", within=_SIZE)
+    blocks: int = setting(2, "residual blocks a stage in the encoder; the decoder has one more", within=_SIZE)
+    halve_time: tuple[bool, ...] = setting(
+        (False, True, True), "whether each of the encoder's downsamplings halves time too"
+    )
+    circular: bool = setting(False, "pad the width with the other edge: exactly yaw-equivariant")
+    dtype: str = setting("float32", "of the convolutions", among=DTYPES)
+    param_dtype: str = setting("float32", "of the parameters", among=DTYPES)
 
     def __post_init__(self):
+        super().__post_init__()
         if len(self.halve_time) != len(self.multipliers) - 1:
-            raise InputError(f"vae.halve_time needs {len(self.multipliers) - 1} entries, one a downsampling")
-        _check("vae", self.dtype, self.param_dtype)
+            raise InputError(
+                f"halve_time must have {len(self.multipliers) - 1} entries, one a downsampling, not {self.halve_time}"
+            )
 
     @property
     def stride(self) -> int:
@@ -83,9 +92,11 @@ class VaeConfig:
 
 
 @dataclass(frozen=True)
-class WanConfig:
-    dit: DitConfig = field(default_factory=DitConfig)
-    vae: VaeConfig = field(default_factory=VaeConfig)
+class WanConfig(Settings):
+    """The full-size network: a diffusion transformer over the latents of a VAE."""
+
+    dit: DitConfig = DitConfig()
+    vae: VaeConfig = VaeConfig()
 
 
 TINY = WanConfig(

@@ -12,17 +12,19 @@ import jax.numpy as jnp
 
 from rein3d_jax.restore.wan.attention import attend, layer_norm, rms_norm
 from rein3d_jax.restore.wan.config import DitConfig
-from rein3d_jax.restore.wan.rotary import rotary_tables, rotate
+from rein3d_jax.restore.wan.rotary import rotary_tables, rotate_pairs
 
-ISLAND = jnp.float32  # of norms, modulation and the timestep, in parameters and arithmetic
+_ISLAND = jnp.float32  # of norms, modulation and the timestep, in parameters and arithmetic
 
 
 class Attention(nn.Module):
+    """Attention of Wan: norms over all heads at once, rotary positions where given."""
+
     config: DitConfig
 
     @nn.compact
     def __call__(self, x, context, rotary=None):
-        """x (b, n, d) asks, `context` (b, m, d) answers; `rotary` turns both."""
+        """Values (b, n, d) of x (b, n, d) attending to `context` (b, m, d); `rotary` rotates queries and keys."""
         config = self.config
         query = self.norm("query_norm", _dense(config, config.width, "query")(x))
         key = self.norm("key_norm", _dense(config, config.width, "key")(context))
@@ -31,28 +33,30 @@ class Attention(nn.Module):
             part.reshape(*part.shape[:2], config.heads, config.head_dim) for part in (query, key, value)
         )
         if rotary is not None:
-            query, key = rotate(query, *rotary), rotate(key, *rotary)
+            query, key = rotate_pairs(query, *rotary), rotate_pairs(key, *rotary)
         out = attend(query, key, value, kernel=config.kernel, chunk=config.query_chunk)
         return _dense(config, config.width, "out")(out.reshape(x.shape))
 
     def norm(self, name, x):
-        scale = self.param(name, nn.initializers.ones, (self.config.width,), ISLAND)
+        scale = self.param(name, nn.initializers.ones, (self.config.width,), _ISLAND)
         return rms_norm(x, scale, self.config.epsilon)
 
 
-class Block(nn.Module):
+class DitBlock(nn.Module):
+    """Block of the transformer: self-attention, attention to the text, a hidden layer."""
+
     config: DitConfig
 
     @nn.compact
     def __call__(self, x, text, modulation, rotary):
         """x (b, n, d); text (b, m, d); modulation (b, 6, d): shift, scale, gate of attention, then of the ffn."""
         config = self.config
-        table = self.param("modulation", _modulation, (6, config.width), ISLAND)
+        table = self.param("modulation", _modulation, (6, config.width), _ISLAND)
         parts = jnp.split(table + modulation, 6, axis=1)
         normed = self.modulate(x, *parts[:2])
         x = self.gated(x, Attention(config, name="self_attention")(normed, normed, rotary), parts[2])
         normed = nn.LayerNorm(
-            config.epsilon, dtype=ISLAND, param_dtype=ISLAND, use_fast_variance=False, name="text_norm"
+            config.epsilon, dtype=_ISLAND, param_dtype=_ISLAND, use_fast_variance=False, name="text_norm"
         )
         x = x + Attention(config, name="text_attention")(normed(x).astype(x.dtype), text)
         hidden = _dense(config, config.ffn, "ffn_in")(self.modulate(x, *parts[3:5]))
@@ -65,15 +69,15 @@ class Block(nn.Module):
         return (x + update * gate).astype(x.dtype)
 
 
-class Step(nn.Module):
-    """One step of the scan over depth: carry (x, control chain), scanned the hint's scale."""
+class DitStep(nn.Module):
+    """Step of the scan over depth: carry (x, control chain), scanned the hint's scale."""
 
     config: DitConfig
 
     @nn.compact
     def __call__(self, carry, hint_scale, text, modulation, rotary):
         config = self.config
-        block = nn.remat(Block, prevent_cse=False) if config.remat else Block
+        block = nn.remat(DitBlock, prevent_cse=False) if config.remat else DitBlock
         x, control = carry
         hint = 0.0
         if config.control_every:
@@ -87,6 +91,8 @@ class Step(nn.Module):
 
 
 class Dit(nn.Module):
+    """The diffusion transformer."""
+
     config: DitConfig
 
     @nn.compact
@@ -106,9 +112,9 @@ class Dit(nn.Module):
         text = _dense(config, config.width, "text_in")(text.astype(dtype))
         text = _dense(config, config.width, "text_out")(nn.gelu(text, approximate=True))
         steps = config.depth // config.group
-        scales = jnp.broadcast_to(jnp.asarray(control_scale, ISLAND), (steps,))
+        scales = jnp.broadcast_to(jnp.asarray(control_scale, _ISLAND), (steps,))
         scan = nn.scan(
-            Step,
+            DitStep,
             variable_axes={"params": 0},
             split_rngs={"params": True},
             in_axes=(0, nn.broadcast, nn.broadcast, nn.broadcast),
@@ -119,7 +125,7 @@ class Dit(nn.Module):
         return unpatchify(self.head(x, time), grid, config.patch)
 
     def embed_time(self, timestep):
-        """(b,) -> the embedding (b, d) and the blocks' modulation (b, 6, d), float32."""
+        """Embedding (b, d) of timesteps (b,) and the blocks' modulation (b, 6, d), float32."""
         width = self.config.width
         hidden = nn.silu(_island(width, "time_in")(sinusoids(timestep, self.config.frequencies)))
         time = _island(width, "time_out")(hidden)
@@ -127,22 +133,22 @@ class Dit(nn.Module):
 
     def head(self, x, time):
         config = self.config
-        table = self.param("modulation", _modulation, (2, config.width), ISLAND)
+        table = self.param("modulation", _modulation, (2, config.width), _ISLAND)
         shift, scale = jnp.split(table + time[:, None], 2, axis=1)
         x = (layer_norm(x, config.epsilon) * (1 + scale) + shift).astype(x.dtype)
         count = config.channels * config.patch[0] * config.patch[1] * config.patch[2]
-        return _dense(config, count, "head")(x).astype(ISLAND)
+        return _dense(config, count, "head")(x).astype(_ISLAND)
 
 
 def sinusoids(timestep: jax.Array, count: int) -> jax.Array:
-    """(b,) -> (b, count): cosines, then sines, of t 10000^(-k / half)."""
+    """Embedding (b, count) of timesteps (b,): cosines, then sines, of t 10000^(-k / half)."""
     half = count // 2
-    angles = timestep.astype(ISLAND)[:, None] * jnp.exp(-jnp.log(1e4) * jnp.arange(half, dtype=ISLAND) / half)
+    angles = timestep.astype(_ISLAND)[:, None] * jnp.exp(-jnp.log(1e4) * jnp.arange(half, dtype=_ISLAND) / half)
     return jnp.concatenate([jnp.cos(angles), jnp.sin(angles)], axis=-1)
 
 
 def patchify(x: jax.Array, patch: tuple[int, int, int]) -> jax.Array:
-    """(b, t, h, w, c) -> (b, tokens, c pt ph pw), the channel slowest: the order of a torch Conv3d's weight."""
+    """Tokens (b, tokens, c pt ph pw) of (b, t, h, w, c), the channel slowest: the order of a torch Conv3d's weight."""
     b, t, h, w, c = x.shape
     assert not (t % patch[0] or h % patch[1] or w % patch[2]), (x.shape, patch)
     x = x.reshape(b, t // patch[0], patch[0], h // patch[1], patch[1], w // patch[2], patch[2], c)
@@ -150,7 +156,8 @@ def patchify(x: jax.Array, patch: tuple[int, int, int]) -> jax.Array:
 
 
 def unpatchify(x: jax.Array, grid: tuple[int, int, int], patch: tuple[int, int, int]) -> jax.Array:
-    """(b, tokens, pt ph pw c) -> (b, t, h, w, c), the channel FASTEST: Wan's head is no transposed convolution."""
+    """Latents (b, t, h, w, c) of tokens (b, tokens, pt ph pw c), the channel FASTEST: Wan's head is no transposed
+    convolution."""
     x = x.reshape(x.shape[0], *grid, *patch, -1).transpose(0, 1, 4, 2, 5, 3, 6, 7)
     return x.reshape(x.shape[0], *(size * step for size, step in zip(grid, patch, strict=True)), -1)
 
@@ -160,7 +167,7 @@ def _dense(config, features, name, **options):
 
 
 def _island(features, name):
-    return nn.Dense(features, dtype=ISLAND, param_dtype=ISLAND, name=name)
+    return nn.Dense(features, dtype=_ISLAND, param_dtype=_ISLAND, name=name)
 
 
 def _modulation(key, shape, dtype):

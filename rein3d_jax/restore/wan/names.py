@@ -17,7 +17,7 @@ LAYOUTS = ("diffusers", "wan")
 
 
 @dataclass(frozen=True)
-class Row:
+class TensorRow:
     """leaf[index] = tensor.transpose(axes).reshape(its shape)"""
 
     leaf: tuple[str, ...]  # keys into the parameters
@@ -28,7 +28,7 @@ class Row:
 
 
 # Ours -> (diffusers, wan). The two libraries call the norm before the text's attention norm2 and norm3.
-DIT = {
+_DIT = {
     "embed": ("patch_embedding", "patch_embedding"),
     "control_embed": ("vace_patch_embedding", "vace_patch_embedding"),
     "control_in": ("vace_blocks.0.proj_in", "vace_blocks.0.before_proj"),
@@ -40,7 +40,7 @@ DIT = {
     "modulation": ("scale_shift_table", "head.modulation"),
     "head": ("proj_out", "head.head"),
 }
-BLOCK = {
+_BLOCK = {
     "modulation": ("scale_shift_table", "modulation"),
     "self_attention": ("attn1", "self_attn"),
     "text_attention": ("attn2", "cross_attn"),
@@ -55,7 +55,7 @@ BLOCK = {
     "ffn_out": ("ffn.net.2", "ffn.2"),
     "hint": ("proj_out", "after_proj"),
 }
-VAE = {
+_VAE = {
     "quant": ("quant_conv", "conv1"),
     "post_quant": ("post_quant_conv", "conv2"),
     "in": ("conv_in", "conv1"),
@@ -65,7 +65,7 @@ VAE = {
     "middle_1": ("mid_block.attentions.0", "middle.1"),
     "middle_2": ("mid_block.resnets.1", "middle.2"),
 }
-VAE_LAYER = {
+_VAE_LAYER = {
     "norm_1": ("norm1", "residual.0"),
     "convolution_1": ("conv1", "residual.2"),
     "norm_2": ("norm2", "residual.3"),
@@ -77,34 +77,34 @@ VAE_LAYER = {
     "query_key_value": ("to_qkv", "to_qkv"),
     "projection": ("proj", "proj"),
 }
-ENDINGS = {"kernel": "weight", "scale": "weight", "bias": "bias"}
+_ENDINGS = {"kernel": "weight", "scale": "weight", "bias": "bias"}
 
 
-def dit_rows(shapes: Mapping, config: DitConfig, layout: str) -> tuple[Row, ...]:
+def dit_rows(shapes: Mapping, config: DitConfig, layout: str) -> tuple[TensorRow, ...]:
     """A row for each tensor of `layout` behind the parameters of `Dit`; `shapes` are those parameters, as arrays or
     jax.ShapeDtypeStruct."""
     column = LAYOUTS.index(layout)
     rows = []
     for leaf, shape in _leaves(shapes):
         if leaf[0] != "steps":
-            tail = [DIT[leaf[0]][column], *(ENDINGS[key] for key in leaf[1:])]
-            rows.append(Row(leaf, None, ".".join(tail), *_linear(leaf, shape, config)))
+            tail = [_DIT[leaf[0]][column], *(_ENDINGS[key] for key in leaf[1:])]
+            rows.append(TensorRow(leaf, None, ".".join(tail), *_linear(leaf, shape, config)))
             continue
-        tail = ".".join(BLOCK[key][column] if key in BLOCK else ENDINGS[key] for key in leaf[2:])
+        tail = ".".join(_BLOCK[key][column] if key in _BLOCK else _ENDINGS[key] for key in leaf[2:])
         for step in range(shape[0]):
             place = f"vace_blocks.{step}"
             if leaf[1].startswith("block_"):
                 place = f"blocks.{step * config.group + int(leaf[1].removeprefix('block_'))}"
             elif leaf[1] == "hint":
-                tail = f"{BLOCK['hint'][column]}.{ENDINGS[leaf[2]]}"
-            rows.append(Row(leaf, step, f"{place}.{tail}", *_linear(leaf, shape[1:], config)))
+                tail = f"{_BLOCK['hint'][column]}.{_ENDINGS[leaf[2]]}"
+            rows.append(TensorRow(leaf, step, f"{place}.{tail}", *_linear(leaf, shape[1:], config)))
     return tuple(rows)
 
 
-def vae_rows(shapes: Mapping, config: VaeConfig, layout: str) -> tuple[Row, ...]:
+def vae_rows(shapes: Mapping, config: VaeConfig, layout: str) -> tuple[TensorRow, ...]:
     """As `dit_rows`, for the parameters of `Vae`."""
     return tuple(
-        Row(leaf, None, _vae_name(leaf, config, LAYOUTS.index(layout)), *_convolution(leaf, shape))
+        TensorRow(leaf, None, _vae_name(leaf, config, LAYOUTS.index(layout)), *_convolution(leaf, shape))
         for leaf, shape in _leaves(shapes)
     )
 
@@ -137,12 +137,12 @@ def _convolution(leaf, shape):
 def _vae_name(leaf, config, column):
     """encoder/layer_3/shortcut/kernel -> encoder.down_blocks.3.conv_shortcut.weight"""
     half, *keys, last = (key for key in leaf if key != "convolution")
-    ending = "gamma" if last == "scale" else ENDINGS[last]
+    ending = "gamma" if last == "scale" else _ENDINGS[last]
     if half not in ("encoder", "decoder"):
-        return f"{VAE[half][column]}.{ending}"
+        return f"{_VAE[half][column]}.{ending}"
     first, *rest = keys
-    place = _layer(half, int(first.removeprefix("layer_")), config) if first.startswith("layer_") else VAE[first]
-    return ".".join([half, place[column], *(VAE_LAYER[key][column] for key in rest), ending])
+    place = _layer(half, int(first.removeprefix("layer_")), config) if first.startswith("layer_") else _VAE[first]
+    return ".".join([half, place[column], *(_VAE_LAYER[key][column] for key in rest), ending])
 
 
 def _layer(half, layer, config):
@@ -156,7 +156,7 @@ def _layer(half, layer, config):
 def layout_of(names: Iterable[str]) -> str:
     """The layout whose mark `names`, all tensors of a checkpoint, bear. Raises InputError if they bear none."""
     marks = {"scale_shift_table": "diffusers", "quant_conv.weight": "diffusers", "head.modulation": "wan"}
-    marks["conv2.weight"] = "wan"  # of the VAE, after its decoder's door
+    marks["conv2.weight"] = "wan"  # of the VAE, at its decoder's entrance
     for name in names:
         if name in marks:
             return marks[name]

@@ -1,6 +1,7 @@
-"""Degraded RGB-alpha clip -> clean clip with the full-size network: encode, condition, sample, decode."""
+"""The full-size network as a restorer: a degraded RGB-alpha clip is encoded, conditions the sampler, and is decoded."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import jax
@@ -10,34 +11,38 @@ from flax import struct
 from rein3d_jax.errors import InputError
 from rein3d_jax.restore.background import Background, restore_background
 from rein3d_jax.restore.blend import blend
-from rein3d_jax.restore.noise import draw_noise, require_kind
+from rein3d_jax.restore.noise import NOISES, draw_noise
 from rein3d_jax.restore.wan.condition import control_latents
 from rein3d_jax.restore.wan.config import WanConfig
 from rein3d_jax.restore.wan.dit import Dit
-from rein3d_jax.restore.wan.sampler import guided, sample
+from rein3d_jax.restore.wan.sampler import guided, sample_latents
 from rein3d_jax.restore.wan.schedule import sampling_sigmas
 from rein3d_jax.restore.wan.solver import SOLVERS
 from rein3d_jax.restore.wan.vae import LATENT, Vae
 from rein3d_jax.restore.wan.windows import WindowConfig, latent_length, restore_in_windows
 from rein3d_jax.scene import Video
+from rein3d_jax.settings import Settings, setting
 
 
 @dataclass(frozen=True)
-class SampleConfig:
-    steps: int = 50  # Wan's own default, as are the next two
-    shift: float = 3.0
-    guidance: float = 5.0  # 1 for one pass a step, without guidance
-    solver: str = "unipc"  # unipc | euler
-    noise: str = "latitude"  # latitude | white | paper
-    turn: bool = True  # turn the panorama at random from step to step, for a network whose RoPE is not circular
-    windows: WindowConfig = field(default_factory=WindowConfig)
+class SampleConfig(Settings):
+    """How a clip is drawn from the full-size network; steps, shift and guidance are Wan's own."""
 
-    def __post_init__(self):
-        if self.steps < 1:
-            raise InputError(f"sample.steps {self.steps} must be at least 1")
-        if self.solver not in SOLVERS:
-            raise InputError(f'sample.solver "{self.solver}" is unknown; choose one of {", ".join(SOLVERS)}')
-        require_kind("sample.noise", self.noise)
+    steps: int = setting(50, "of the sampler", within="[1, inf)")
+    shift: float = setting(3.0, "of the schedule towards high noise, for large pictures", within="(0, inf)")
+    guidance: float = setting(5.0, "scale of the classifier-free guidance; 1: one pass a step, without it")
+    solver: str = setting("unipc", "of the flow's ODE", among=tuple(SOLVERS))
+    noise: str = setting("latitude", "correlated as pixels crowd, white, or the paper's warp", among=tuple(NOISES))
+    random_yaw: bool = setting(True, "yaw the panorama at random from step to step, for a RoPE that is not circular")
+    windows: WindowConfig = WindowConfig()
+
+
+@dataclass(frozen=True)
+class DiffusionConfig(Settings):
+    """The full-size network, and how clips are drawn from it."""
+
+    network: WanConfig = WanConfig()
+    sample: SampleConfig = SampleConfig()
 
 
 @struct.dataclass
@@ -50,61 +55,55 @@ class WanParams:
     no_text: jax.Array  # the same for the negative prompt; used if guidance is not 1
 
 
+@struct.dataclass
+class DegradedClip:
+    """A clip as the network is given it, and the context anchor: the panorama at the world's origin. sRGB in [0, 1]."""
+
+    rgb: jax.Array  # (t, h, w, 3)
+    alpha: jax.Array  # (t, h, w) 1 = observed
+    anchor: jax.Array  # (h, w, 3)
+
+
 def restore_video(
     video: Video,
     key: jax.Array,
     *,
     params: WanParams,
-    config: WanConfig,
-    sampling: SampleConfig,
+    config: DiffusionConfig,
     observed: float,
     background: Background | None = None,
 ) -> Video:
-    """A restorer once all keywords are bound. The context anchor is frame 0, which stands at the world's origin.
+    """The restored video: a restorer once all keywords are bound. The anchor is frame 0, at the world's origin.
 
-    What was observed (alpha near 1) returns as it was, guesses take its colours. The network knows no distance: holes
+    What was observed (alpha near 1) returns as it was, guesses take its colours. The network gives no distance: holes
     take the background fill's. Raises InputError unless tokens fill a frame (multiples of 16 pixels).
     """
-    require_size(*video.alpha.shape[1:], config)
-    key_noise, key_turn = jax.random.split(key)
-    noise = clip_noise(key_noise, video.alpha.shape, config, sampling.noise)
-    drawn = restore_frames(
-        key_turn, params, video.rgb, video.alpha, video.rgb[0], noise, config=config, sampling=sampling
-    )
+    require_size(*video.alpha.shape[1:], config.network)
+    key_noise, key_yaw = jax.random.split(key)
+    noise = clip_noise(key_noise, video.alpha.shape, config)
+    drawn = restore_frames(key_yaw, params, DegradedClip(video.rgb, video.alpha, video.rgb[0]), noise, config)
     filled = restore_background(video, observed=observed, background=background)
     return filled.replace(rgb=blend(drawn, video.rgb, video.alpha, observed=observed))
 
 
-def clip_noise(key: jax.Array, shape: tuple[int, int, int], config: WanConfig, kind: str) -> jax.Array:
-    """(1 + latents, h', w', 16) for a clip of `shape` (t, h, w) pixels; the anchor's comes first."""
-    frames, height, width = shape
-    size = (1 + latent_length(frames), height // config.vae.stride, width // config.vae.stride, LATENT)
-    return draw_noise(key, size, kind=kind)
+def clip_noise(key: jax.Array, shape: tuple[int, int, int], config: DiffusionConfig) -> jax.Array:
+    """Noise (1 + latents, h', w', 16) for a clip of `shape` (t, h, w) pixels; the anchor's comes first."""
+    (frames, height, width), stride = shape, config.network.vae.stride
+    size = (1 + latent_length(frames), height // stride, width // stride, LATENT)
+    return draw_noise(key, size, kind=config.sample.noise)
 
 
 def restore_frames(
-    key: jax.Array,
-    params: WanParams,
-    rgb: jax.Array,
-    alpha: jax.Array,
-    anchor: jax.Array,
-    noise: jax.Array,
-    *,
-    config: WanConfig,
-    sampling: SampleConfig,
+    key: jax.Array, params: WanParams, clip: DegradedClip, noise: jax.Array, config: DiffusionConfig
 ) -> jax.Array:
-    """Clean sRGB (t, h, w, 3), every pixel the network's, of a degraded clip rgb (t, h, w, 3), alpha (t, h, w), any t.
+    """Clean sRGB (t, h, w, 3), every pixel the network's, of a clip of any length; noise is that of `clip_noise`, the
+    key yaws the panorama between steps."""
 
-    anchor (h, w, 3) is the panorama at the world's origin, noise that of `clip_noise`; the key turns the panorama
-    between steps.
-    """
-    turn_by = config.dit.patch[2] if sampling.turn else 0
+    def restore(rgb, alpha, part_noise):
+        part = DegradedClip(rgb, alpha, clip.anchor)
+        return _restore_window(key, params, part, jnp.concatenate([noise[:1], part_noise]), config)
 
-    def restore(part_rgb, part_alpha, part_noise):
-        part = (part_rgb, part_alpha, anchor, jnp.concatenate([noise[:1], part_noise]))
-        return _restore_clip(key, params, *part, config=config, sampling=sampling, turn_by=turn_by)
-
-    return restore_in_windows(restore, rgb, alpha, noise[1:], sampling.windows)
+    return restore_in_windows(restore, clip.rgb, clip.alpha, noise[1:], config.sample.windows)
 
 
 def require_size(height: int, width: int, config: WanConfig) -> None:
@@ -115,7 +114,7 @@ def require_size(height: int, width: int, config: WanConfig) -> None:
 
 
 def clip_velocity(params: WanParams, config: WanConfig, guidance: float):
-    """The network as the sampler sees it: (x, control, timestep) -> velocity, guided."""
+    """Velocity (x, control, timestep) of the network under its text, guided, as the sampler takes it."""
 
     def under(text):
         def velocity(x, control, timestep):
@@ -128,18 +127,19 @@ def clip_velocity(params: WanParams, config: WanConfig, guidance: float):
     return guided(under(params.text), under(params.no_text), guidance)
 
 
-def _restore(key, params, rgb, alpha, anchor, noise, *, config, sampling, turn_by):
-    vae = Vae(config.vae)
+@partial(jax.jit, static_argnames="config")
+def _restore_window(key, params: WanParams, clip: DegradedClip, noise, config: DiffusionConfig):
+    network, sampling = config.network, config.sample
+    vae = Vae(network.vae)
 
     def encode(video):
         return vae.apply({"params": params.vae}, video, method="encode")
 
-    control = control_latents(encode, rgb[None], alpha[None], anchor[None], stride=config.vae.stride)
+    given = (clip.rgb[None], clip.alpha[None], clip.anchor[None])
+    control = control_latents(encode, *given, stride=network.vae.stride)
     solver = SOLVERS[sampling.solver](sampling_sigmas(sampling.steps, sampling.shift))
-    velocity = clip_velocity(params, config, sampling.guidance)
-    latents = sample(key, velocity, noise[None], control, solver, turn_by=turn_by)
+    velocity = clip_velocity(params, network, sampling.guidance)
+    yaw_step = network.dit.patch[2] if sampling.random_yaw else 0
+    latents = sample_latents(key, velocity, noise[None], control, solver, yaw_step=yaw_step)
     video = vae.apply({"params": params.vae}, latents[:, 1:], method="decode")
     return (video[0] + 1) / 2
-
-
-_restore_clip = jax.jit(_restore, static_argnames=("config", "sampling", "turn_by"))

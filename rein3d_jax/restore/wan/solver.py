@@ -15,7 +15,7 @@ from rein3d_jax.restore.wan.schedule import timesteps_of
 
 
 class Solver(NamedTuple):
-    """One row a step, in float64; the sampler rounds to what it computes in."""
+    """Coefficients, one row a step, in float64; the sampler rounds to its own precision."""
 
     sigma: np.ndarray  # (n,)
     timestep: np.ndarray  # (n,)
@@ -24,16 +24,17 @@ class Solver(NamedTuple):
 
 
 def euler(sigmas: np.ndarray) -> Solver:
-    """x' = x + (s' - s) v = (s' / s) x + (1 - s' / s) x0"""
+    """Coefficients of x' = x + (s' - s) v = (s' / s) x + (1 - s' / s) x0."""
     ratio = sigmas[1:] / sigmas[:-1]
     correct = np.tile([1.0, 0, 0, 0, 0], (len(ratio), 1))
     return Solver(sigmas[:-1], timesteps_of(sigmas), correct, np.stack([ratio, 1 - ratio, 0 * ratio], axis=1))
 
 
 def unipc(sigmas: np.ndarray) -> Solver:
-    """Order 1 in the first step and the last, order 2 between; each step but the first corrects the one before."""
+    """Coefficients of UniPC: order 1 in the first step and the last, order 2 between; each step but the first corrects
+    the one before."""
     timesteps, count = timesteps_of(sigmas), len(sigmas) - 1
-    # The reference rounds its sigmas, and the first, 1 - 1e-6, is 3 % of lambda's argument off for it.
+    # The reference rounds its sigmas, and the first, 1 - 1e-6, is 3 % of lambda's argument off in it.
     sigmas = sigmas.astype(np.float32).astype(np.float64)
     orders = [1 if step in (0, count - 1) else 2 for step in range(count)]
     predict = [_predict(sigmas, step, orders[step]) for step in range(count)]
@@ -41,7 +42,7 @@ def unipc(sigmas: np.ndarray) -> Solver:
     return Solver(sigmas[:-1], timesteps, np.array(correct), np.array(predict))
 
 
-SOLVERS = {"euler": euler, "unipc": unipc}
+SOLVERS = {"unipc": unipc, "euler": euler}
 
 
 def _lambda(sigma):

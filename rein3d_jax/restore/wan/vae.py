@@ -20,6 +20,8 @@ STD += (3.2687, 2.1526, 2.8652, 1.5579, 1.6382, 1.1253, 2.8251, 1.9160)
 
 
 class Vae(nn.Module):
+    """The VAE; its parameters are those of both halves."""
+
     config: VaeConfig
 
     def setup(self):
@@ -29,11 +31,11 @@ class Vae(nn.Module):
         self.decoder = Decoder(self.config)
 
     def __call__(self, video):
-        """There and back; names every parameter."""
+        """The video encoded and decoded; initialises every parameter."""
         return self.decode(self.encode(video))
 
     def encode(self, video: jax.Array) -> jax.Array:
-        """The latents' mean (no sample), normalised to about zero mean and unit variance, float32."""
+        """Latents' mean (no sample), normalised to about zero mean and unit variance, float32."""
         frames, height, width = video.shape[1:4]
         time_stride, stride = self.config.time_stride, self.config.stride
         assert (frames - 1) % time_stride == 0, f"{frames} frames; pad to 1 + {time_stride} n"
@@ -48,6 +50,8 @@ class Vae(nn.Module):
 
 
 class Encoder(nn.Module):
+    """Encoder: video to the moments of the latents."""
+
     config: VaeConfig
 
     @nn.compact
@@ -66,6 +70,8 @@ class Encoder(nn.Module):
 
 
 class Decoder(nn.Module):
+    """Decoder: latents to video."""
+
     config: VaeConfig
 
     @nn.compact
@@ -85,6 +91,8 @@ class Decoder(nn.Module):
 
 
 class Residual(nn.Module):
+    """Residual block of two convolutions."""
+
     config: VaeConfig
     features: int
 
@@ -98,7 +106,7 @@ class Residual(nn.Module):
 
 
 class FrameAttention(nn.Module):
-    """Each frame attends to itself, with one head and no positions."""
+    """Attention of each frame to itself, with one head and no positions."""
 
     config: VaeConfig
 
@@ -112,6 +120,8 @@ class FrameAttention(nn.Module):
 
 
 class Downsample(nn.Module):
+    """Half the height and width, and half the time where asked for."""
+
     config: VaeConfig
     halve_time: bool
 
@@ -129,6 +139,8 @@ class Downsample(nn.Module):
 
 
 class Upsample(nn.Module):
+    """Twice the height and width, and twice the time where asked for."""
+
     config: VaeConfig
     double_time: bool
 
@@ -147,7 +159,7 @@ class Upsample(nn.Module):
 
 
 class Convolution(nn.Module):
-    """3 x 3 x 3, causal: two zero frames in front, none behind."""
+    """3 x 3 x 3 convolution, causal: two zero frames in front, none behind."""
 
     config: VaeConfig
     features: int

@@ -1,4 +1,4 @@
-"""Long trajectories: overlapping windows of frames, restored one by one and cross-faded; none is dropped.
+"""Windows over long trajectories: they overlap, are restored one by one and cross-faded; no frame is dropped.
 
 A clip is lengthened to 1 + 4 n frames by repeating its last and cut back at the end. Windows begin at multiples of 4,
 so that a window's latents lie where the whole clip's would: a frame's noise is the same in each window that sees it.
@@ -12,20 +12,26 @@ import jax.numpy as jnp
 import numpy as np
 
 from rein3d_jax.errors import InputError
+from rein3d_jax.settings import Settings, setting
 
 STRIDE = 4  # frames a latent
 
 
 @dataclass(frozen=True)
-class WindowConfig:
-    frames: int = 41  # the paper's clips, its network's length in training
-    overlap: int = 9  # frames shared by neighbours, at least
+class WindowConfig(Settings):
+    """Windows in which the frames of a trajectory are restored."""
+
+    frames: int = setting(41, "of a window, 1 + 4 n; the paper trains with 41", within="[5, inf)")
+    overlap: int = setting(9, "frames shared by neighbouring windows, at least", within="[0, inf)")
 
     def __post_init__(self):
-        if self.frames % STRIDE != 1 or self.frames <= STRIDE:
-            raise InputError(f"window.frames {self.frames} must be 1 + {STRIDE} n and at least {1 + STRIDE}")
-        if not 0 <= self.overlap <= self.frames - STRIDE:
-            raise InputError(f"window.overlap {self.overlap} must lie in 0 ... {self.frames - STRIDE}")
+        super().__post_init__()
+        if self.frames % STRIDE != 1:
+            raise InputError(f"frames must be 1 + {STRIDE} n, not {self.frames}")
+        if self.overlap > self.frames - STRIDE:
+            raise InputError(
+                f"overlap must be in [0, {self.frames - STRIDE}] for {self.frames} frames, not {self.overlap}"
+            )
 
 
 def padded_length(frames: int) -> int:
@@ -39,14 +45,14 @@ def latent_length(frames: int) -> int:
 
 
 def window_starts(frames: int, config: WindowConfig) -> tuple[int, ...]:
-    """First frames of the windows that cover a clip of `padded_length` frames; the last ends with it."""
+    """Starts of the windows that cover a clip of `padded_length` frames; the last ends with it."""
     step = (config.frames - config.overlap) // STRIDE * STRIDE
     last = max(frames - config.frames, 0)
     return (*range(0, last, step), last)
 
 
 def window_weights(frames: int, config: WindowConfig) -> np.ndarray:
-    """(windows, frames): each window's share in each frame; shares fade linearly over an overlap and sum to 1."""
+    """Share (windows, frames) of each window in each frame; shares fade linearly over an overlap and sum to 1."""
     starts = window_starts(frames, config)
     place = np.arange(frames)[None] - np.array(starts)[:, None]
     length = min(config.frames, frames)
@@ -61,7 +67,7 @@ def restore_in_windows(
     noise: jax.Array,
     config: WindowConfig,
 ) -> jax.Array:
-    """`restore(rgb, alpha, noise)` over all windows of a clip, blended -> (t, h, w, 3), t as it came.
+    """The clip (t, h, w, 3): `restore(rgb, alpha, noise)` of each window, blended.
 
     rgb (t, h, w, 3), alpha (t, h, w); noise (latent_length(t), h', w', c), the latents' of the whole clip.
     """

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.ablate import __main__ as ablate
 from experiments.example_store import write_examples
-from rein3d_jax.restore.learned.condition import FILLS, Clip
+from rein3d_jax.restore.learned.condition import CANDIDATES, Clip
 from rein3d_jax.restore.learned.loss import Example
 
 ROWS, FRAMES = 16, 2
@@ -47,7 +47,9 @@ def example(index: int) -> Example:
         return rng.random((*shape, *channels), np.float32)
 
     alpha = (values() < 0.7).astype(np.float32)
-    clip = Clip(values(3), alpha, 1 + values(), values(FILLS, 3), 1 + values(FILLS), np.zeros((FRAMES, 3), np.float32))
+    clip = Clip(
+        values(3), alpha, 1 + values(), values(CANDIDATES, 3), 1 + values(CANDIDATES), np.zeros((FRAMES, 3), np.float32)
+    )
     return Example(clip, values(3), 1 + values())
 
 
@@ -66,7 +68,7 @@ def test_every_variant_is_trained_with_every_seed_and_once(tmp_path, monkeypatch
         gain = scores["gain_2"]
         assert len(gain["seeds"]) == 2 and np.isclose(gain["mean"], np.mean(gain["seeds"]))
         assert np.isclose(gain["sem"], np.abs(np.subtract(*gain["seeds"])) / 2)  # of two: half their difference
-    monkeypatch.setattr(ablate, "train", lambda *_, **__: pytest.fail("trained again"))
+    monkeypatch.setattr(ablate, "train_learned", lambda *_, **__: pytest.fail("trained again"))
     assert run(tmp_path, RECIPE + TABLE) == 0
     assert json.loads((tmp_path / "out.json").read_text())["variants"] == found
 

@@ -3,7 +3,7 @@
 import jax
 import numpy as np
 
-from experiments.build_examples.__main__ import ExamplesConfig, example
+from experiments.build_examples.example import ExamplesConfig, example
 
 CONFIG = ExamplesConfig(height=32, frames=2)
 
@@ -17,12 +17,12 @@ def test_a_number_gives_one_example_which_begins_at_its_anchor_and_shows_what_is
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(made))
     length = np.linalg.norm(clip.position, axis=-1)
     # Each frame is drawn within the last half of its part of the way.
-    assert length[0] == 0 and CONFIG.shortest / 2 <= length[1] <= CONFIG.longest
+    assert length[0] == 0 and CONFIG.min_length / 2 <= length[1] <= CONFIG.max_length
     assert clip.alpha[0].min() > 0.9 and clip.alpha[1].min() < 0.5  # splats of one pixel each cover 0.93 of it here
 
     known = clip.alpha > 0.9
     error, elsewhere = (np.abs(x - made.clean_rgb)[known].mean() for x in (clip.rgb, np.roll(clip.rgb, 5, axis=2)))
-    # Splats blur by half a pixel of 11 degrees; measured 0.026, and 0.10 for the same picture turned by 5 columns.
+    # Splats blur by half a pixel of 11 degrees; measured 0.026, and 0.10 for the same picture rolled by 5 columns.
     assert error < 0.05 < elsewhere
     there = known & (clip.distance > 0) & (made.clean_distance > 0)
     assert there.sum() > 0.9 * known.sum()

@@ -11,13 +11,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from experiments.train_restore.config import GuardConfig, OptimizerConfig
+from experiments.train_restore.config import GuardConfig, OptimizerConfig, TrainConfig
 from experiments.train_restore.guarded_step import batch_gradient, first_state, guarded_step
 from rein3d_jax.parallel import BACKENDS, data_mesh, data_parallel, gather
 
 PARAMETERS = {"a": jnp.array([1.0, 2.0]), "b": jnp.array(3.0)}
 BATCH = np.random.default_rng(0).normal(size=(8, 2)).astype(np.float32)
-OPTIMIZER = OptimizerConfig(rate=0.1, warmup=0, clip=1e9, average=0.5)
+CONFIG = TrainConfig(
+    steps=10, optimizer=OptimizerConfig(rate=0.1, warmup=0, clip=1e9, average=0.5), guard=GuardConfig(spike=10.0)
+)
 
 
 def loss(parameters, part):
@@ -32,8 +34,7 @@ def alone(x):
 
 @jax.jit
 def step(state, batch):
-    options = {"loss": loss, "config": OPTIMIZER, "guard": GuardConfig(spike=10.0), "steps": 10}
-    return guarded_step(state, batch, alone, **options)
+    return guarded_step(state, batch, alone, loss=loss, config=CONFIG)
 
 
 def mean_loss(parameters):
@@ -50,7 +51,7 @@ def test_a_batch_in_parts_has_the_gradient_of_the_whole(parts):
 
 
 def test_a_step_descends_and_the_average_follows():
-    state = first_state(PARAMETERS, OPTIMIZER, 10)
+    state = first_state(PARAMETERS, CONFIG)
     after, metrics = step(state, BATCH[None])
     assert mean_loss(after.parameters) < metrics["loss"] and int(after.step) == 1
     # The first step's decay is (1 + 0) / (10 + 0).
@@ -58,10 +59,10 @@ def test_a_step_descends_and_the_average_follows():
 
 
 @pytest.mark.parametrize("poison", [np.nan, np.inf, 100.0])
-def test_what_is_out_of_the_common_is_not_followed_but_counted(poison):
-    state, _ = step(first_state(PARAMETERS, OPTIMIZER, 10), BATCH[None])
+def test_a_gradient_far_above_its_running_norm_is_not_followed_but_counted(poison):
+    state, _ = step(first_state(PARAMETERS, CONFIG), BATCH[None])
     bad, metrics = step(state, poison * BATCH[None])
-    for name in ("parameters", "average", "optimizer", "usual"):
+    for name in ("parameters", "average", "optimizer", "running_norm"):
         jax.tree.map(np.testing.assert_array_equal, getattr(bad, name), getattr(state, name))
     assert (int(bad.step), int(bad.skipped), int(metrics["in_a_row"])) == (2, 1, 1)
     good, _ = step(bad, BATCH[None])
@@ -70,10 +71,10 @@ def test_what_is_out_of_the_common_is_not_followed_but_counted(poison):
 
 @pytest.mark.parametrize("poison", [np.nan, np.inf])
 def test_the_first_step_is_not_followed_either_where_it_is_not_finite(poison):
-    state = first_state(PARAMETERS, OPTIMIZER, 10)
+    state = first_state(PARAMETERS, CONFIG)
     bad, _ = step(state, poison * BATCH[None])
     jax.tree.map(np.testing.assert_array_equal, bad.parameters, PARAMETERS)
-    assert (int(bad.skipped), float(bad.usual)) == (1, 0.0)
+    assert (int(bad.skipped), float(bad.running_norm)) == (1, 0.0)
 
 
 def test_four_devices_have_the_gradient_of_one():

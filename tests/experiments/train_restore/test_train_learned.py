@@ -16,12 +16,13 @@ from experiments.config import dump_config, load_config
 from experiments.example_store import ExampleStore, write_examples
 from experiments.restorer_network import read_network
 from experiments.train_restore.__main__ import main
-from experiments.train_restore.config import DataConfig, GuardConfig, OptimizerConfig, TrainConfig
-from experiments.train_restore.data import batch
-from experiments.train_restore.learned import train
+from experiments.train_restore.config import GuardConfig, OptimizerConfig
+from experiments.train_restore.learned.config import ExampleDataConfig, LearnedTrainConfig
+from experiments.train_restore.learned.data import example_batch
+from experiments.train_restore.learned.train import train_learned
 from experiments.train_restore.run import TrainingRun
 from rein3d_jax.errors import InputError
-from rein3d_jax.restore.learned.condition import FILLS, Clip
+from rein3d_jax.restore.learned.condition import CANDIDATES, Clip
 from rein3d_jax.restore.learned.config import NetworkConfig
 from rein3d_jax.restore.learned.loss import Example
 from rein3d_jax.restore.restorer import RestoreConfig
@@ -38,7 +39,7 @@ def example(index: int) -> Example:
     alpha = (values() < 0.7).astype(np.float32)
     alpha[0] = 1.0
     position = np.concatenate([np.zeros((1, 3)), rng.normal(size=(FRAMES - 1, 3))]).astype(np.float32)
-    clip = Clip(values(3), alpha, (1 + values()) * alpha, values(FILLS, 3), 1 + values(FILLS), position)
+    clip = Clip(values(3), alpha, (1 + values()) * alpha, values(CANDIDATES, 3), 1 + values(CANDIDATES), position)
     return Example(clip, values(3), 1 + values())
 
 
@@ -63,12 +64,12 @@ def folder(tmp_path_factory):
     return path
 
 
-def config_of(folder, output, **options) -> TrainConfig:
+def config_of(folder, output, **options) -> LearnedTrainConfig:
     network = NetworkConfig(rows=ROWS, fine=8, width=8, depth=1, heads=1, expand=1)
     times = {"steps": STEPS, "log_every": 1, "save_every": 2, "evaluate_every": STEPS}
     parts = {"network": network, "optimizer": OptimizerConfig(rate=1e-2, warmup=0)}
-    return TrainConfig(
-        output=str(output), data=DataConfig(str(folder), frames=2, held_out=2), **times, **parts, **options
+    return LearnedTrainConfig(
+        output=str(output), data=ExampleDataConfig(str(folder), frames=2, held_out=2), **times, **parts, **options
     )
 
 
@@ -76,7 +77,7 @@ def config_of(folder, output, **options) -> TrainConfig:
 def unbroken(folder, tmp_path_factory):
     """(config, last state) of a run that nobody killed."""
     config = config_of(folder, tmp_path_factory.mktemp("run"))
-    return config, train(config)
+    return config, train_learned(config)
 
 
 def log_of(output) -> list[dict]:
@@ -105,17 +106,17 @@ def test_examples_come_back_as_they_are_stored(folder):
 
 def test_a_batch_is_of_its_step_the_seed_and_a_hosts_share(folder, tmp_path):
     store, config = ExampleStore(folder), config_of(folder, tmp_path, batch=4, accumulate=2)
-    same = batch(store, 3, config)
-    jax.tree.map(np.testing.assert_array_equal, same, batch(ExampleStore(folder), 3, config))
+    same = example_batch(store, 3, config)
+    jax.tree.map(np.testing.assert_array_equal, same, example_batch(ExampleStore(folder), 3, config))
     assert same.seeds.shape == (2, 2, 2) and same.examples.clip.alpha.shape == (2, 2, 2, ROWS, 2 * ROWS)
-    for other in (batch(store, 4, config), batch(store, 3, replace(config, seed=1))):
+    for other in (example_batch(store, 4, config), example_batch(store, 3, replace(config, seed=1))):
         assert not np.array_equal(other.seeds, same.seeds)
     once = replace(config, accumulate=1)
-    whole, *shares = (batch(store, 3, once, host=i, hosts=n) for i, n in ((0, 1), (0, 2), (1, 2)))
+    whole, *shares = (example_batch(store, 3, once, host=i, hosts=n) for i, n in ((0, 1), (0, 2), (1, 2)))
     jax.tree.map(lambda w, *s: np.testing.assert_array_equal(w, np.concatenate(s, axis=1)), whole, *shares)
     held_out = [store.example(index).clean_rgb[0] for index in range(2)]
     for step in range(10):
-        anchors = batch(store, step, config).examples.clean_rgb[:, :, 0].reshape(4, ROWS, 2 * ROWS, 3)
+        anchors = example_batch(store, step, config).examples.clean_rgb[:, :, 0].reshape(4, ROWS, 2 * ROWS, 3)
         assert not any(np.array_equal(x, y) for x in anchors for y in held_out)
 
 
@@ -129,18 +130,18 @@ def test_a_run_that_was_killed_goes_on_to_the_same_parameters(folder, unbroken, 
 
     monkeypatch.setattr(TrainingRun, "after", killed)
     with pytest.raises(KeyboardInterrupt):
-        train(config)
+        train_learned(config)
     monkeypatch.undo()
     with pytest.raises(InputError, match="--resume"):
-        train(config)
-    state = train(config, resume=True)
+        train_learned(config)
+    state = train_learned(config, resume=True)
     jax.tree.map(np.testing.assert_array_equal, state, unbroken[1])
     assert [line["step"] for line in log_of(tmp_path) if "loss" in line] == [1, 2, 3, 3, 4]  # 2 was the last saved
 
 
 def test_a_run_writes_its_recipe_log_pictures_and_weights_that_restore(unbroken):
     (config, state), output = unbroken, Path(unbroken[0].output)
-    assert load_config(TrainConfig, output / "config.toml") == config
+    assert load_config(LearnedTrainConfig, output / "config.toml") == config
     records = log_of(output)
     assert [line["step"] for line in records if "loss" in line] == list(range(1, STEPS + 1))
     assert None not in records[0].values() and None not in records[-1].values()  # null is what is not finite
@@ -164,9 +165,9 @@ def poisoned(folder, indices):
 def test_a_step_with_poisoned_data_is_skipped_and_counted(tmp_path):
     poisoned(tmp_path, [4])
     config, store = config_of(tmp_path, tmp_path / "run"), ExampleStore(tmp_path)
-    bad = [np.isnan(batch(store, step, config).examples.clip.position).any() for step in range(STEPS)]
+    bad = [np.isnan(example_batch(store, step, config).examples.clip.position).any() for step in range(STEPS)]
     assert 0 < sum(bad) < STEPS
-    state = train(config)
+    state = train_learned(config)
     counted = [line["skipped"] for line in log_of(tmp_path / "run") if "loss" in line]
     assert counted == np.cumsum(bad).tolist() and int(state.skipped) == sum(bad)
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(state.parameters))
@@ -176,7 +177,7 @@ def test_the_guards_patience_ends_the_run_with_its_checkpoint(tmp_path):
     poisoned(tmp_path, slice(2, None))
     config = config_of(tmp_path, tmp_path / "run", guard=GuardConfig(patience=3))
     with pytest.raises(InputError, match=r"3 steps in a row .* lower optimizer.rate and --resume"):
-        train(config)
+        train_learned(config)
     assert [line["skipped"] for line in log_of(tmp_path / "run")] == [1, 2]
     assert (tmp_path / "run" / "checkpoints" / "2").is_dir()
 
@@ -194,5 +195,5 @@ def test_what_cannot_be_trained_is_refused_in_one_line(unbroken, tmp_path, capsy
     recipe, text = tmp_path / "recipe.toml", dump_config(unbroken[0])
     recipe.write_text(text.replace('model = "learned"', 'model = "magic"') if "magic" in change else text)
     assert main(["--config", str(recipe), "--set", change]) == 2
-    told = capsys.readouterr().err
-    assert REFUSED[change] in told and told.startswith("train_restore: ") and told.count("\n") == 1
+    error = capsys.readouterr().err
+    assert REFUSED[change] in error and error.startswith("train_restore: ") and error.count("\n") == 1

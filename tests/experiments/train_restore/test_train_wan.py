@@ -13,10 +13,10 @@ from jax.sharding import NamedSharding, PartitionSpec
 from experiments.config import dump_config, load_config
 from experiments.train_restore.__main__ import main
 from experiments.train_restore.config import OptimizerConfig
-from experiments.train_restore.wan import train
-from experiments.train_restore.wan_config import PairsConfig, WanTrainConfig
-from experiments.train_restore.wan_data import batch, batches, open_pairs
-from experiments.train_restore.wan_step import adapted, make_step, start
+from experiments.train_restore.wan.config import PairDataConfig, WanTrainConfig
+from experiments.train_restore.wan.data import open_pairs, pair_batch, pair_batches
+from experiments.train_restore.wan.step import adapted, initial_wan_state, make_wan_step
+from experiments.train_restore.wan.train import train_wan
 from experiments.wan_weights import random_wan, read_wan, write_wan
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.training_checkpoint import TrainingCheckpoints
@@ -70,7 +70,7 @@ def config_of(folder, output="", **options):
         evaluate_every=2,
         network=NETWORK,
         sampling=SampleConfig(steps=1, guidance=1.0, solver="euler"),
-        data=PairsConfig(folder, held_out=1),
+        data=PairDataConfig(folder, held_out=1),
         optimizer=OptimizerConfig(rate=1e-2, warmup=0),
         **{"trainable": TrainableConfig("adapter")} | options,
     )
@@ -83,32 +83,34 @@ def same(a, b):
 def test_two_steps_killed_between_end_as_unbroken_change_the_adapter_alone_and_write_what_reads(folder, tmp_path):
     config = config_of(folder, tmp_path)
     mesh = data_mesh(config.devices)
-    step = data_parallel(make_step(config), mesh, axis=1)
+    step = data_parallel(make_wan_step(config), mesh, axis=1)
     before, pairs = random_wan(config.seed, NETWORK), open_pairs(config)
-    state = jax.device_put(jax.tree.map(np.asarray, start(before, config)), NamedSharding(mesh, PartitionSpec()))
-    state, _ = step(state, batch(pairs, 0, config, 0, 1))
+    state = jax.device_put(
+        jax.tree.map(np.asarray, initial_wan_state(before, config)), NamedSharding(mesh, PartitionSpec())
+    )
+    state, _ = step(state, pair_batch(pairs, 0, config, 0, 1))
     with TrainingCheckpoints(tmp_path / "checkpoints") as checkpoints:
         checkpoints.save(1, state.train, -np.inf)  # so that the next one is the best
-    unbroken, _ = step(state, batch(pairs, 1, config, 0, 1))
+    unbroken, _ = step(state, pair_batch(pairs, 1, config, 0, 1))
     with pytest.raises(InputError, match="--resume"):
-        train(config)
-    state = train(config, resume=True)
+        train_wan(config)
+    state = train_wan(config, resume=True)
     lines = (tmp_path / "log.jsonl").read_text().splitlines()
     assert {json.loads(line)["step"] for line in lines} == {2}  # step 1 was not taken again
     assert same(unbroken.train, state.train) and int(state.train.step) == 2 and int(state.train.skipped) == 0
 
-    after = adapted(state.train.parameters, state, config)
+    after = adapted(state.train.parameters, state.fixed, config)
     assert same(before.dit["steps"]["block_0"], after.dit["steps"]["block_0"]) and same(before.vae, after.vae)
     assert not same(before.dit["steps"]["hint"], after.dit["steps"]["hint"])
     assert (tmp_path / "samples" / "000002.png").exists()
     assert load_config(WanTrainConfig, tmp_path / "config.toml") == config
-    written = adapted(state.train.average, state, config)
+    written = adapted(state.train.average, state.fixed, config)
     assert same(read_wan(tmp_path / "weights", NETWORK), written)
 
 
 def test_low_rank_pairs_go_through_a_checkpoint(folder, tmp_path):
     config = config_of(folder, trainable=TrainableConfig("lora", LoraConfig(rank=2)))
-    train_state = start(random_wan(0, NETWORK), config).train
+    train_state = initial_wan_state(random_wan(0, NETWORK), config).train
     with TrainingCheckpoints(tmp_path) as checkpoints:
         checkpoints.save(1, train_state, 0.0)
     with TrainingCheckpoints(tmp_path) as checkpoints:
@@ -118,12 +120,14 @@ def test_low_rank_pairs_go_through_a_checkpoint(folder, tmp_path):
 def test_a_step_is_of_its_number_and_the_seed_and_every_pair_has_its_turn(folder):
     config = replace(config_of(folder), steps=5)
     pairs = open_pairs(config)
-    later = list(batches(pairs, 2, config))
-    assert len(later) == 3 and same(later[1], batch(pairs, 3, config, 0, 1))
+    later = list(pair_batches(pairs, 2, config))
+    assert len(later) == 3 and same(later[1], pair_batch(pairs, 3, config, 0, 1))
     assert not same(later[1].seed, later[2].seed)
-    whole, *halves = (batch(pairs, 0, replace(config, accumulate=1), *share) for share in ((0, 1), (0, 2), (1, 2)))
+    whole, *halves = (pair_batch(pairs, 0, replace(config, accumulate=1), *share) for share in ((0, 1), (0, 2), (1, 2)))
     assert same(whole, jax.tree.map(lambda a, b: np.concatenate([a, b], axis=1), *halves))
-    seen = [batch(pairs, step, replace(config, batch=1, accumulate=1), 0, 1).rgb[0, 0] for step in range(PAIRS - 1)]
+    seen = [
+        pair_batch(pairs, step, replace(config, batch=1, accumulate=1), 0, 1).rgb[0, 0] for step in range(PAIRS - 1)
+    ]
     assert len({x.tobytes() for x in seen}) == PAIRS - 1  # once round: all but the one held out
     assert not any(same(x, pairs[0].degraded.rgb) for x in seen)
 
@@ -132,10 +136,10 @@ def test_what_cannot_be_trained_is_refused(folder, tmp_path, capsys):
     with pytest.raises(InputError, match="1 \\+ 4 n"):
         open_pairs(config_of(write_pairs(tmp_path, frames=4)))
     with pytest.raises(InputError, match="held_out takes 4"):
-        open_pairs(replace(config_of(folder), data=PairsConfig(folder, held_out=4)))
+        open_pairs(replace(config_of(folder), data=PairDataConfig(folder, held_out=4)))
     huge = replace(config_of(folder), network=WanConfig(replace(DitConfig(), depth=3000)))
     with pytest.raises(InputError, match="smaller preset"):
-        train(huge)
+        train_wan(huge)
     (tmp_path / "recipe.toml").write_text(dump_config(huge))
     assert main(["--config", str(tmp_path / "recipe.toml"), "--set", "batch=3"]) == 2
     assert "accumulate" in capsys.readouterr().err

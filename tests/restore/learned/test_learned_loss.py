@@ -10,14 +10,14 @@ import pytest
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.sphere import latitudes
 from rein3d_jax.restore.learned.augment import augment, shaded
-from rein3d_jax.restore.learned.condition import FILLS, Clip
+from rein3d_jax.restore.learned.condition import CANDIDATES, Clip
 from rein3d_jax.restore.learned.loss import (
     NOISE,
     Example,
     LossConfig,
-    noised,
+    clean_residual,
+    noisy_residual,
     pixel_weights,
-    residual,
     restoration_loss,
 )
 from rein3d_jax.restore.learned.mixture import base
@@ -40,15 +40,15 @@ def example_of(seed) -> Example:
     alpha[0] = 1.0
     clean, distance = values(3), np.broadcast_to(1 + values()[0], SHAPE)  # seen from one place: nothing is hidden
     known = (alpha == 1)[..., None, None]
-    fills = np.where(known, clean[..., None, :], values(FILLS, 3))
+    fills = np.where(known, clean[..., None, :], values(CANDIDATES, 3))
     clip = Clip(
-        clean * (alpha[..., None] > 0), alpha, distance * (alpha > 0), fills, 1 + values(FILLS), np.zeros((3, 3))
+        clean * (alpha[..., None] > 0), alpha, distance * (alpha > 0), fills, 1 + values(CANDIDATES), np.zeros((3, 3))
     )
     return jax.tree.map(jnp.float32, Example(clip, clean, distance))
 
 
 EXAMPLES = jax.tree.map(lambda *x: jnp.stack(x), *[example_of(seed) for seed in range(COUNT)])
-WANTED = residual(EXAMPLES)
+WANTED = clean_residual(EXAMPLES)
 FREE = EXAMPLES.clip.alpha < 0.9  # what an observed pixel's weight of 0 leaves to the network
 FREE = FREE.at[:, 0].set(False)
 
@@ -70,8 +70,8 @@ def test_every_example_counts_1_at_the_start_and_less_the_nearer_the_guess():
 
 
 def test_the_anchor_and_observed_pixels_do_not_count():
-    told = jnp.where(FREE[..., None], WANTED, 100.0)
-    assert float(penalty(told, EXAMPLES, CONFIG)[0]) == float(penalty(WANTED, EXAMPLES, CONFIG)[0])
+    guess = jnp.where(FREE[..., None], WANTED, 100.0)
+    assert float(penalty(guess, EXAMPLES, CONFIG)[0]) == float(penalty(WANTED, EXAMPLES, CONFIG)[0])
     slope = jax.grad(lambda x: penalty(x, EXAMPLES, CONFIG)[0])(jnp.zeros_like(WANTED))
     np.testing.assert_array_equal(slope[~FREE], 0.0)
     assert np.all(np.any(slope[FREE] != 0, axis=-1))
@@ -91,7 +91,7 @@ def test_latitude_weights_go_from_the_area_to_uniform():
         np.testing.assert_array_equal(found[0], 0.0)  # the anchor
         expected = np.broadcast_to((weight + (1 - weight) * cosine)[:, None], found[1:].shape)
         np.testing.assert_allclose(found[1:], expected, rtol=1e-6)  # float32
-    with pytest.raises(InputError, match=r"loss.latitude 1.5"):
+    with pytest.raises(InputError, match=r"latitude must be in \[0, 1\], not 1\.5"):
         LossConfig(latitude=1.5)
 
 
@@ -103,29 +103,29 @@ def test_a_pixels_weight_falls_as_more_of_it_was_observed():
     np.testing.assert_allclose(half[..., -1], 0.5 * half[..., 0], rtol=1e-6)  # float32
 
 
-def test_at_share_0_nothing_is_shown():
-    noisy, level = noised(jax.random.key(0), example_of(0), 0.0)
+def test_at_share_0_the_level_is_1_and_the_residual_0():
+    noisy, level = noisy_residual(jax.random.key(0), example_of(0), 0.0)
     assert float(level) == 1.0 and not np.any(noisy)
 
 
 def test_a_noisy_residual_lies_on_the_straight_path_or_is_not_shown():
     one, levels = example_of(0), []
-    draw = jax.jit(noised, static_argnums=(2, 3))
+    draw = jax.jit(noisy_residual, static_argnums=(2, 3))
     for seed in range(12):
         noisy, level = draw(jax.random.key(seed), one, 0.5, "white")
         levels.append(float(level))
         if level == 1:
             assert not np.any(noisy)
         else:
-            noise = (noisy - (1 - level) * residual(one)) / level
+            noise = (noisy - (1 - level) * clean_residual(one)) / level
             # Of N = 6,144 draws the deviation is known to 1 / sqrt(2 N) = 0.9 %, the mean to 1.3 % of it; five times.
             assert abs(noise.std() / NOISE - 1) < 0.05 and abs(noise.mean()) < 0.07 * NOISE
     assert 0 < sum(level == 1 for level in levels) < 12
     assert len(set(levels)) > 2
 
 
-def test_an_example_as_it_might_have_been_keeps_what_is_known():
-    """Turns, mirrors and tones are shared: what was observed as it is stays as it is."""
+def test_an_augmented_example_keeps_what_is_known():
+    """Yaws, mirrors and tones are shared: what was observed as it is stays as it is."""
     change = jax.jit(augment)
     for seed in range(6):
         before = example_of(seed)

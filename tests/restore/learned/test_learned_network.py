@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rein3d_jax.restore.learned.attention import attend, rotate, turns
-from rein3d_jax.restore.learned.augment import mirrored, turned
-from rein3d_jax.restore.learned.condition import FEATURES, FILLS, Clip, features
+from rein3d_jax.restore.learned.attention import dot_product_attention, rotary_angles, rotate_halves
+from rein3d_jax.restore.learned.augment import mirrored, yawed
+from rein3d_jax.restore.learned.condition import CANDIDATES, FEATURES, Clip, network_features
 from rein3d_jax.restore.learned.config import TOKEN, NetworkConfig
 from rein3d_jax.restore.learned.convolution import fold, unfold, wrap
 from rein3d_jax.restore.learned.loss import Example
@@ -45,7 +45,7 @@ def example_of(rows=ROWS, frames=FRAMES) -> Example:
 
     alpha = (values() < 0.7).astype(jnp.float32).at[0].set(1.0)
     position = jnp.asarray(rng.normal(size=(frames, 3)).astype(np.float32)).at[0].set(0.0)
-    clip = Clip(values(3), alpha, (1 + values()) * alpha, values(FILLS, 3), 1 + values(FILLS), position)
+    clip = Clip(values(3), alpha, (1 + values()) * alpha, values(CANDIDATES, 3), 1 + values(CANDIDATES), position)
     return Example(clip, values(3), 1 + values())
 
 
@@ -70,11 +70,11 @@ def test_the_network_starts_as_the_fills_mean_and_no_more_once_it_has_learnt(row
 
 
 @pytest.mark.parametrize("rows", [ROWS, 2 * ROWS])
-def test_a_clip_turned_by_a_multiple_of_the_token_is_restored_turned(rows):
+def test_a_yaw_by_a_multiple_of_the_token_commutes(rows):
     """In columns of the full picture, which is halved until it has the network's rows."""
     example, noisy = example_of(rows), noise(rows)
     columns = 3 * TOKEN * rows // ROWS
-    moved = predicted(PARAMETERS, turned(example, columns).clip, jnp.roll(noisy, columns, axis=2))
+    moved = predicted(PARAMETERS, yawed(example, columns).clip, jnp.roll(noisy, columns, axis=2))
     before = predicted(PARAMETERS, example.clip, noisy)
     np.testing.assert_allclose(moved, jnp.roll(before, columns, axis=2), atol=ATOL)
     still = predicted(PARAMETERS, example.clip, jnp.roll(noisy, columns, axis=2))
@@ -98,7 +98,7 @@ def test_frames_in_another_order_are_restored_in_that_order():
 
 
 @pytest.mark.parametrize("anchor", [True, False])
-def test_frames_look_at_the_anchor_or_it_is_as_if_it_were_not_there(anchor):
+def test_frames_attend_to_the_anchor_or_it_is_as_if_it_were_not_there(anchor):
     config = replace(CONFIG, anchor=anchor)
     given = jax.random.normal(jax.random.key(3), (1, FRAMES, ROWS, 2 * ROWS, FEATURES))
     run = jax.jit(lambda x: Network(config).apply({"params": PARAMETERS}, x, LEVEL)[:, 1:])
@@ -119,21 +119,21 @@ def clips_first(clips):
 
 
 @pytest.mark.parametrize("columns", [1, 5, -7])
-def test_a_turned_example_has_rolled_features(columns):
+def test_an_example_after_a_yaw_has_rolled_features(columns):
     example, noisy = example_of(), noise()
-    moved = features(turned(example, columns).clip, jnp.roll(noisy, columns, axis=2))
-    before = features(example.clip, noisy)
+    moved = network_features(yawed(example, columns).clip, jnp.roll(noisy, columns, axis=2))
+    before = network_features(example.clip, noisy)
     assert before.shape[-1] == FEATURES
-    np.testing.assert_allclose(moved, jnp.roll(before, columns, axis=2), atol=1e-5)  # a float32 turn of 3 m
+    np.testing.assert_allclose(moved, jnp.roll(before, columns, axis=2), atol=1e-5)  # a float32 rotation of 3 m
 
 
-def test_mirrored_twice_or_turned_all_around_is_the_same_example():
+def test_mirrored_twice_or_rotated_all_around_is_the_same_example():
     example = example_of()
     jax.tree.map(np.testing.assert_array_equal, mirrored(mirrored(example)), example)
     assert not np.array_equal(mirrored(example).clip.rgb, example.clip.rgb)
     around = partial(np.testing.assert_allclose, atol=1e-6)  # positions: the sine of a float32 2 pi is 2e-7
-    jax.tree.map(around, turned(example, 2 * ROWS), example)
-    jax.tree.map(around, turned(turned(example, 5), -5), example)
+    jax.tree.map(around, yawed(example, 2 * ROWS), example)
+    jax.tree.map(around, yawed(yawed(example, 5), -5), example)
 
 
 @pytest.mark.parametrize("size", [2, 4])
@@ -160,16 +160,16 @@ NO_ROWS, NO_COLUMNS = ((0, 0), (0, 0), (1, 1), (0, 0)), ((0, 0), (1, 1), (0, 0),
 def test_attention_is_a_softmax_and_knows_no_first_column():
     rows, columns, heads, size = 2, 6, 2, 8
     query, key, value = jax.random.normal(jax.random.key(4), (3, rows * columns, heads, size))
-    turn = turns(rows, columns, size)
+    angles = rotary_angles(rows, columns, size)
 
-    def met(query, key, value):
-        return attend(rotate(query, turn), rotate(key, turn), value)
+    def attended(query, key, value):
+        return dot_product_attention(rotate_halves(query, angles), rotate_halves(key, angles), value)
 
     def rolled(x):
         return jnp.roll(x.reshape(rows, columns, heads, size), 2, axis=1).reshape(x.shape)
 
-    after = met(*map(rolled, (query, key, value)))
-    np.testing.assert_allclose(after, rolled(met(query, key, value)), atol=1e-5)  # float32 sums of 8 and of 12
+    after = attended(*map(rolled, (query, key, value)))
+    np.testing.assert_allclose(after, rolled(attended(query, key, value)), atol=1e-5)  # float32 sums of 8 and of 12
     scores = np.exp(np.einsum("nhd,mhd->nmh", query, key) / np.sqrt(size))
     expected = np.einsum("nmh,mhd->nhd", scores / scores.sum(axis=1, keepdims=True), value)
-    np.testing.assert_allclose(attend(query, key, value), expected, atol=1e-5)
+    np.testing.assert_allclose(dot_product_attention(query, key, value), expected, atol=1e-5)

@@ -12,7 +12,7 @@ from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.restore import RestoreConfig, background_of, restorer
 from rein3d_jax.restore.blend import TRUSTED
 from rein3d_jax.restore.learned.candidates import clip_of, positions
-from rein3d_jax.restore.learned.condition import FILLS
+from rein3d_jax.restore.learned.condition import CANDIDATES
 from rein3d_jax.restore.learned.config import NetworkConfig
 from rein3d_jax.restore.learned.network import initial_parameters
 from rein3d_jax.restore.learned.restore import Learned, restore_learned
@@ -118,7 +118,7 @@ def test_every_fill_is_what_was_rendered_where_it_is_known(room):
     video = video_of(3)
     clip = clip_of(video, observed=OBSERVED, background=room)
     known = (video.alpha >= OBSERVED) & (video.distance > 0)
-    for index in range(FILLS):
+    for index in range(CANDIDATES):
         np.testing.assert_array_equal(clip.fill_rgb[..., index, :][known], video.rgb[known])
         np.testing.assert_array_equal(clip.fill_distance[..., index][known], video.distance[known])
     assert np.all(clip.fill_distance > 0) and np.isfinite(clip.fill_rgb).all()

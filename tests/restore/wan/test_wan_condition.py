@@ -1,4 +1,4 @@
-"""VACE's control: streams that add up to the video, masks folded without loss, the anchor first and all kept."""
+"""VACE's control: streams that add up to the video, masks folded without loss, the anchor first and all of it given."""
 
 import jax
 import jax.numpy as jnp
@@ -24,9 +24,9 @@ def control(rgb=RGB, alpha=ALPHA, anchor=ANCHOR):
 
 def test_streams_share_out_the_video_by_the_mask():
     signal, mask = signal_of(RGB, ALPHA), mask_of(ALPHA)
-    kept, made = streams(signal, mask)
-    np.testing.assert_array_equal(kept + made, signal)
-    np.testing.assert_array_equal((kept != 0).any(axis=-1) & (made != 0).any(axis=-1), False)
+    inactive, reactive = streams(signal, mask)
+    np.testing.assert_array_equal(inactive + reactive, signal)
+    np.testing.assert_array_equal((inactive != 0).any(axis=-1) & (reactive != 0).any(axis=-1), False)
     np.testing.assert_array_equal(mask_of(jnp.array([0.0, 0.49, 0.5, 1.0])), [1, 1, 0, 0])
 
 
@@ -35,12 +35,12 @@ def test_what_nobody_saw_is_mid_grey_and_not_black():
     np.testing.assert_array_equal(signal_of(RGB, jnp.ones_like(ALPHA)), 2 * RGB - 1)
 
 
-def test_the_order_is_anchor_then_video_and_kept_made_mask():
+def test_the_order_is_anchor_then_video_and_inactive_reactive_mask():
     latents = control()
     assert latents.shape == (2, 1 + 3, 2, 3, 96)
-    kept, made = streams(signal_of(RGB, ALPHA), mask_of(ALPHA))
-    np.testing.assert_array_equal(latents[:, 1:, ..., :16], encode(kept))
-    np.testing.assert_array_equal(latents[:, 1:, ..., 16:32], encode(made))
+    inactive, reactive = streams(signal_of(RGB, ALPHA), mask_of(ALPHA))
+    np.testing.assert_array_equal(latents[:, 1:, ..., :16], encode(inactive))
+    np.testing.assert_array_equal(latents[:, 1:, ..., 16:32], encode(reactive))
     np.testing.assert_array_equal(latents[:, 0, ..., :16], encode(2 * ANCHOR[:, None] - 1)[:, 0])
     assert (latents[:, 0, ..., 16:] == 0).all()
 

@@ -13,7 +13,7 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.restore.wan.attention import attend
 from rein3d_jax.restore.wan.config import TINY, DitConfig, preset
 from rein3d_jax.restore.wan.dit import Dit, patchify, unpatchify
-from rein3d_jax.restore.wan.rotary import rotary_tables, rotate
+from rein3d_jax.restore.wan.rotary import rotary_tables, rotate_pairs
 from rein3d_jax.restore.wan.training.memory import count, dit_shapes
 
 ROUNDING = 1e-5  # of the largest value: float32 through 6 blocks; sums change their order
@@ -82,7 +82,7 @@ def test_circular_frequencies_are_whole_turns_and_close_to_the_trained_ones():
 def test_rotation_keeps_length_and_sees_only_differences_of_places():
     cosine, sine = rotary_tables((5, 1, 1), 12, circular=False)
     x = jax.random.normal(jax.random.key(0), (1, 1, 2, 12)).repeat(5, axis=1)
-    turned = rotate(x, cosine, sine)
+    turned = rotate_pairs(x, cosine, sine)
     np.testing.assert_allclose(jnp.linalg.norm(turned, axis=-1), jnp.linalg.norm(x, axis=-1), rtol=1e-6)
     products = jnp.einsum("bnhd,bmhd->hnm", turned, turned)
     np.testing.assert_allclose(products[:, 1:, 1:], products[:, :-1, :-1], atol=1e-5)  # |x|^2 is about 12
@@ -104,8 +104,10 @@ def test_control_acts_by_its_hints_alone(golden_dit):
 def test_rematerialisation_and_chunks_change_neither_value_nor_gradient(golden_dit):
     params, arguments = plain(golden_dit)
     lean = replace(PLAIN, remat=True, query_chunk=7)
-    usual, saved = (jax.tree.leaves(loss_and_gradient(config, params, *arguments)) for config in (PLAIN, lean))
-    for a, b in zip(usual, saved, strict=True):
+    plain_leaves, lean_leaves = (
+        jax.tree.leaves(loss_and_gradient(config, params, *arguments)) for config in (PLAIN, lean)
+    )
+    for a, b in zip(plain_leaves, lean_leaves, strict=True):
         np.testing.assert_allclose(b, a, rtol=0, atol=ROUNDING * np.abs(a).max() + 1e-7)
 
 
@@ -171,7 +173,14 @@ def test_the_large_preset_lowers_for_gpu_and_tpu_with_abstract_weights():
 
 
 @pytest.mark.parametrize(
-    ("options", "named"), [({"depth": 3}, "dit.depth"), ({"dtype": "int8"}, "int8"), ({"kernel": "magic"}, "magic")]
+    ("options", "named"),
+    [
+        ({"depth": 3}, "depth must be a multiple of control_every"),
+        ({"dtype": "int8"}, "dtype must be one of .*int8"),
+        ({"kernel": "magic"}, "magic"),
+        ({"head_dim": 7}, "must be even"),
+        ({"patch": (1, 2, 0)}, "patch must be in"),
+    ],
 )
 def test_bad_configs_are_refused_by_name(options, named):
     with pytest.raises(InputError, match=named):

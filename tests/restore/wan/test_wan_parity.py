@@ -20,7 +20,7 @@ from rein3d_jax.restore.wan.condition import control_latents
 from rein3d_jax.restore.wan.config import TINY, VaeConfig, preset
 from rein3d_jax.restore.wan.dit import Dit
 from rein3d_jax.restore.wan.names import dit_rows, vae_rows
-from rein3d_jax.restore.wan.sampler import sample
+from rein3d_jax.restore.wan.sampler import sample_latents
 from rein3d_jax.restore.wan.schedule import sampling_sigmas
 from rein3d_jax.restore.wan.solver import unipc
 from rein3d_jax.restore.wan.training.memory import dit_shapes, vae_shapes
@@ -224,7 +224,7 @@ def test_unipc(steps):
     np.testing.assert_array_equal(solver.timestep, case["timesteps"])
     with jax.enable_x64(True):
         noise = jnp.asarray(case["noise"], jnp.float64)
-        drawn = sample(jax.random.key(0), lambda x, _, t: jnp.sin(2 * x) + t / 1000 * x, noise, None, solver)
+        drawn = sample_latents(jax.random.key(0), lambda x, _, t: jnp.sin(2 * x) + t / 1000 * x, noise, None, solver)
     np.testing.assert_allclose(drawn, case["sample"], rtol=0, atol=SOLVER_TOLERANCE)
 
 

@@ -1,11 +1,11 @@
-"""Flow matching and its solvers: exact where theory says exact, of the order they claim, blind to turns."""
+"""Flow matching and its solvers: exact where theory says exact, of the order they claim, blind to yaws."""
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rein3d_jax.restore.wan.sampler import guided, sample
+from rein3d_jax.restore.wan.sampler import guided, sample_latents
 from rein3d_jax.restore.wan.schedule import clean_of, noised, sampling_sigmas, timesteps_of, velocity_of
 from rein3d_jax.restore.wan.solver import SOLVERS, euler, unipc
 
@@ -27,7 +27,7 @@ def error(solver, steps):
     scale = np.sqrt(sigmas**2 + (1 - sigmas) ** 2 * SPREAD**2)
     with jax.enable_x64(True):
         rows = solver(sigmas)._replace(timestep=1000 * sigmas[:-1])  # not cut to whole numbers: the ODE itself
-        end = sample(KEY, gaussian_velocity, jnp.ones((1, 1, 1), jnp.float64), None, rows)
+        end = sample_latents(KEY, gaussian_velocity, jnp.ones((1, 1, 1), jnp.float64), None, rows)
     return abs(float(end[0, 0, 0]) - scale[-1] / scale[0])
 
 
@@ -47,7 +47,9 @@ def test_noise_velocity_and_clean_fit_together():
 @pytest.mark.parametrize("steps", [1, 2, 3, 10])
 def test_straight_paths_are_followed_exactly(solver, steps):
     """The velocity of one clip and one noise is constant, so any number of steps ends at the clip."""
-    drawn = sample(KEY, lambda x, *_: velocity_of(CLEAN, NOISE), NOISE, None, solver(sampling_sigmas(steps, 3.0)))
+    drawn = sample_latents(
+        KEY, lambda x, *_: velocity_of(CLEAN, NOISE), NOISE, None, solver(sampling_sigmas(steps, 3.0))
+    )
     np.testing.assert_allclose(drawn, CLEAN, atol=1e-5)  # float32; the first sigma is 1e-6 short of 1
 
 
@@ -71,11 +73,11 @@ def test_it_is_what_diffusers_samples(golden_unipc):
 
     solver = unipc(sampling_sigmas(10, 3.0))
     np.testing.assert_array_equal(solver.timestep, golden_unipc["timesteps"])
-    drawn = sample(KEY, velocity, jnp.asarray(golden_unipc["noise"]), None, solver)
+    drawn = sample_latents(KEY, velocity, jnp.asarray(golden_unipc["noise"]), None, solver)
     np.testing.assert_allclose(drawn, golden_unipc["sample"], atol=1e-5)  # float32; 1e-6 in float64 (parity test)
 
 
-def test_turns_show_the_network_all_seams_and_leave_the_panorama_where_it_was():
+def test_random_yaws_move_the_seam_for_the_network_and_leave_the_panorama_where_it_was():
     columns = jnp.arange(6.0)[:, None]
 
     def pointwise(x, control, timestep):
@@ -87,8 +89,10 @@ def test_turns_show_the_network_all_seams_and_leave_the_panorama_where_it_was():
     solver = unipc(sampling_sigmas(6, 3.0))
     control = jnp.broadcast_to(columns, NOISE.shape) / 6
     for velocity, blind in ((pointwise, True), (with_a_seam, False)):
-        still, turned = (sample(jax.random.key(4), velocity, NOISE, control, solver, turn_by=by) for by in (0, 2))
-        assert np.allclose(still, turned, atol=1e-5) == blind
+        still, rolled = (
+            sample_latents(jax.random.key(4), velocity, NOISE, control, solver, yaw_step=by) for by in (0, 2)
+        )
+        assert np.allclose(still, rolled, atol=1e-5) == blind
 
 
 def test_guidance_goes_on_from_what_is_said_without_text():

@@ -68,7 +68,13 @@ def test_neighbours_fade_into_each_other_linearly():
 
 
 @pytest.mark.parametrize(
-    ("options", "named"), [({"frames": 40}, "1 \\+ 4 n"), ({"frames": 1}, "at least 5"), ({"overlap": 38}, "0 ... 37")]
+    ("options", "named"),
+    [
+        ({"frames": 40}, "1 \\+ 4 n"),
+        ({"frames": 1}, "frames must be in .5, inf"),
+        ({"overlap": 38}, "overlap must be in .0, 37"),
+        ({"overlap": -1}, "not -1"),
+    ],
 )
 def test_bad_windows_are_refused(options, named):
     with pytest.raises(InputError, match=named):

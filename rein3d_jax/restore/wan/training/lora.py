@@ -12,27 +12,30 @@ import jax.numpy as jnp
 from flax import struct
 
 from rein3d_jax.errors import InputError
+from rein3d_jax.settings import Settings, setting
 
 
 @dataclass(frozen=True)
-class LoraConfig:
-    rank: int = 32
-    gain: float = 1.0
-    kernels: tuple[str, ...] = ("query", "key", "value", "out", "ffn_in", "ffn_out")  # in each block of both branches
+class LoraConfig(Settings):
+    """Low-rank adaptation of the transformer."""
 
-    def __post_init__(self):
-        if self.rank < 1:
-            raise InputError(f"lora.rank {self.rank} must be at least 1")
+    rank: int = setting(32, "of each pair", within="[1, inf)")
+    gain: float = setting(1.0, "of the pairs' product over the kernel")
+    kernels: tuple[str, ...] = setting(
+        ("query", "key", "value", "out", "ffn_in", "ffn_out"), "names of those adapted, in each block of both branches"
+    )
 
 
 @struct.dataclass
-class Pair:
+class LoraPair:
+    """A kernel's low-rank change: down times up."""
+
     down: jax.Array  # (..., in, rank)
     up: jax.Array  # (..., rank, out)
 
 
-def start_pairs(key: jax.Array, params: dict, config: LoraConfig) -> dict[str, Pair]:
-    """A pair for each kernel (..., in, out) named, by its path. Raises InputError for a name that no kernel has."""
+def start_pairs(key: jax.Array, params: dict, config: LoraConfig) -> dict[str, LoraPair]:
+    """Pairs of the kernels (..., in, out) named, by their paths. Raises InputError for a name that no kernel has."""
     leaves = leaves_by_path(params)
     unknown = set(config.kernels) - {_name(path) for path in leaves}
     if unknown:
@@ -42,7 +45,7 @@ def start_pairs(key: jax.Array, params: dict, config: LoraConfig) -> dict[str, P
     return {path: _start_pair(key, leaf, config.rank) for key, (path, leaf) in zip(keys, named, strict=True)}
 
 
-def merge(params: dict, pairs: dict[str, Pair], config: LoraConfig) -> dict:
+def merge_lora(params: dict, pairs: dict[str, LoraPair], config: LoraConfig) -> dict:
     """The adapted parameters, in the base's own types."""
 
     def adapted(path, leaf):
@@ -56,14 +59,14 @@ def merge(params: dict, pairs: dict[str, Pair], config: LoraConfig) -> dict:
 
 
 def leaves_by_path(params: dict) -> dict[str, jax.Array]:
-    """steps/control/ffn_in/kernel -> the leaf."""
+    """Leaves by their paths, such as steps/control/ffn_in/kernel."""
     return {_path(path): leaf for path, leaf in jax.tree_util.tree_leaves_with_path(params)}
 
 
 def _start_pair(key, kernel, rank):
     *stack, features, out = kernel.shape
     down = jax.random.normal(key, (*stack, features, rank)) * features**-0.5
-    return Pair(down, jnp.zeros((*stack, rank, out)))
+    return LoraPair(down, jnp.zeros((*stack, rank, out)))
 
 
 def _path(path):

@@ -1,4 +1,4 @@
-"""What the full-size network needs on one device, foreseen before anything is allocated.
+"""Memory that the full-size network needs on one device, foreseen before anything is allocated.
 
 Parameters and optimizer are counted; activations are estimates of what lives at once. XLA's own account on the CPU, in
 float32 and for small sizes, is 1.01 to 1.03 of the VAE's and 0.5 to 1.2 of the transformer's (test_wan_memory.py); a
@@ -26,6 +26,8 @@ GIB = 2**30
 
 @dataclass(frozen=True)
 class Workload:
+    """What is restored or trained at once."""
+
     frames: int = 41
     height: int = 448
     width: int = 896
@@ -46,12 +48,13 @@ class Forecast:
 
     @property
     def total(self) -> int:
+        """Bytes at the fullest moment."""
         return self.parameters + self.optimizer + max(self.dit_activations, self.vae_activations)
 
 
 @cache
 def dit_shapes(config: DitConfig):
-    """The parameters of `Dit` as a tree of jax.ShapeDtypeStruct; nothing is allocated."""
+    """Parameters of `Dit` as a tree of jax.ShapeDtypeStruct; nothing is allocated."""
     grid = tuple(config.patch)
     latents = jax.ShapeDtypeStruct((1, *grid, config.channels), jnp.float32)
     control = jax.ShapeDtypeStruct((1, *grid, config.control_channels), jnp.float32) if config.control_every else None
@@ -62,7 +65,7 @@ def dit_shapes(config: DitConfig):
 
 @cache
 def vae_shapes(config: VaeConfig):
-    """The same of `Vae`."""
+    """Parameters of `Vae` as such a tree."""
     video = jax.ShapeDtypeStruct((1, 1, config.stride, config.stride, 3), jnp.float32)
     return jax.eval_shape(Vae(config).init, jax.random.key(0), video)["params"]
 
@@ -73,7 +76,7 @@ def count(shapes) -> int:
 
 
 def forecast(config: WanConfig, work: Workload) -> Forecast:
-    """What `work` needs; training updates the transformer, the VAE stays as it is."""
+    """Memory that `work` needs; training updates the transformer, the VAE stays as it is."""
     dit, vae = (_bytes(shapes) for shapes in (dit_shapes(config.dit), vae_shapes(config.vae)))
     training = _training_bytes(config.dit, work.trainable) // work.shards if work.train else 0
     return Forecast(dit + vae, training, _dit_activations(config, work), _vae_activations(config, work))
@@ -120,20 +123,21 @@ def _dit_activations(config, work):
     size = np.dtype(jnp.dtype(dit.dtype)).itemsize
     row = work.batch * length * size
     queries = length if dit.kernel == "xla" else min(dit.query_chunk, length)
-    # Logits and weights of one chunk: float32, and the weights once more in dtype. A fused kernel keeps neither.
+    # Logits and weights of one chunk: float32, and the weights once more in dtype. A fused kernel stores neither.
     logits = 0 if dit.kernel == "cudnn" else work.batch * dit.heads * queries * length * (8 + size)
     if not work.train:  # x, control, normed, query, key, value, out, hint; ffn before and after its gelu
         return row * (8 * dit.width + 2 * dit.ffn) + logits
-    # What autodiff keeps of a block: about 24 values a channel, 8 of them in float32, and 8 a channel of the ffn,
+    # What autodiff stores of a block: about 24 values a channel, 8 of them in float32, and 8 a channel of the ffn,
     # most of them for the derivative of its gelu.
     block = row * ((16 + 8 * max(4 // size, 1)) * dit.width + 8 * dit.ffn)
     blocks = dit.depth + dit.depth // dit.control_every if dit.control_every else dit.depth
-    kept = blocks * row * dit.width + 2 * block if dit.remat else blocks * block
-    return kept + 2 * logits
+    stored = blocks * row * dit.width + 2 * block if dit.remat else blocks * block
+    return stored + 2 * logits
 
 
 def _training_bytes(config, trainable):
-    """Four numbers for each that is trained. LoRA's merged kernels exist beside the base, and so do their gradients."""
+    """Bytes of four numbers for each that is trained. LoRA's merged kernels exist beside the base, and so do their
+    gradients."""
     shapes = dit_shapes(config)
     if trainable.part != "lora":
         return 4 * _bytes(start_training(None, shapes, trainable)[0])
@@ -142,7 +146,7 @@ def _training_bytes(config, trainable):
 
 
 def _vae_activations(config, work):
-    """The widest place is the full-size stage: a convolution's padded input, its output, the shortcut, a norm."""
+    """Bytes of the full-size stage, the widest: a convolution's padded input, its output, the shortcut, a norm."""
     size = np.dtype(jnp.dtype(config.vae.dtype)).itemsize
     return 4 * work.batch * work.frames * work.height * work.width * config.vae.base * size
 

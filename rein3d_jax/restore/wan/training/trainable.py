@@ -1,4 +1,4 @@
-"""Which numbers of the transformer are trained; the others stay as they are and need no optimizer.
+"""The part of the transformer that is trained; the rest stays as it is and needs no optimizer.
 
 `start_training` parts the parameters once, `assemble` joins them at each step and at the end.
 """
@@ -8,26 +8,26 @@ from typing import Any
 
 import jax
 
-from rein3d_jax.errors import InputError
-from rein3d_jax.restore.wan.training.lora import LoraConfig, merge, start_pairs
+from rein3d_jax.restore.wan.training.lora import LoraConfig, merge_lora, start_pairs
+from rein3d_jax.settings import Settings, setting
 
-PARTS = ("all", "adapter", "lora")
-ADAPTER = {"control_embed", "control_in", "control", "hint"}  # VACE's context adapter: what Wan itself has not
+TRAINABLE_PARTS = ("all", "adapter", "lora")
+_ADAPTER = {"control_embed", "control_in", "control", "hint"}  # VACE's context adapter: what Wan itself has not
 
 
 @dataclass(frozen=True)
-class TrainableConfig:
-    part: str = "adapter"  # all | adapter (VACE's own recipe) | lora
-    lora: LoraConfig = LoraConfig()
+class TrainableConfig(Settings):
+    """Which part of the transformer is trained."""
 
-    def __post_init__(self):
-        if self.part not in PARTS:
-            raise InputError(f'trainable.part "{self.part}" is unknown; choose one of {", ".join(PARTS)}')
+    part: str = setting(
+        "adapter", "all of it, VACE's context adapter (its own recipe), or low-rank pairs", among=TRAINABLE_PARTS
+    )
+    lora: LoraConfig = LoraConfig()
 
 
 def start_training(key: jax.Array, params: dict, config: TrainableConfig) -> tuple[Any, Any]:
-    """(trained, frozen), two pytrees; without LoRA both have the parameters' form, and None where the other has a leaf.
-    A new LoRA or a new adapter changes nothing yet; the key is for the first."""
+    """Trained and frozen parameters, two pytrees; without LoRA both have the parameters' form, and None where the other
+    has a leaf. A new LoRA or a new adapter changes nothing yet; the key is for the first."""
     if config.part == "lora":
         return start_pairs(key, params, config.lora), params
     return tuple(_where(params, lambda path, part=part: trains(path, config) == part) for part in (True, False))
@@ -36,13 +36,13 @@ def start_training(key: jax.Array, params: dict, config: TrainableConfig) -> tup
 def assemble(trained: Any, frozen: Any, config: TrainableConfig) -> dict:
     """Parameters for `Dit`. Differentiate with respect to `trained` alone."""
     if config.part == "lora":
-        return merge(frozen, trained, config.lora)
+        return merge_lora(frozen, trained, config.lora)
     return jax.tree.map(lambda a, b: b if a is None else a, trained, frozen, is_leaf=lambda leaf: leaf is None)
 
 
 def trains(path: tuple, config: TrainableConfig) -> bool:
     """Whether the leaf at `path` (jax.tree_util's keys) is one of those trained itself, as no LoRA's are."""
-    return config.part == "all" or not ADAPTER.isdisjoint(key.key for key in path)
+    return config.part == "all" or not _ADAPTER.isdisjoint(key.key for key in path)
 
 
 def _where(params, chosen):

@@ -12,32 +12,32 @@ import jax
 import numpy as np
 from jax.sharding import NamedSharding, PartitionSpec
 
-from experiments.train_restore.wan_config import WanTrainConfig
-from experiments.train_restore.wan_data import batches, open_pairs
-from experiments.train_restore.wan_run import WanRun
-from experiments.train_restore.wan_step import WanState, make_step, start
+from experiments.train_restore.run import clips_per_device, last_step
+from experiments.train_restore.wan.config import WanTrainConfig
+from experiments.train_restore.wan.data import open_pairs, pair_batches
+from experiments.train_restore.wan.run import WanRun
+from experiments.train_restore.wan.step import WanState, initial_wan_state, make_wan_step
 from experiments.wan_weights import random_wan, read_wan
-from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.training_checkpoint import TrainingCheckpoints
 from rein3d_jax.io.pairs.pair_shard import PairDataset
-from rein3d_jax.parallel import data_mesh, data_parallel, spread
+from rein3d_jax.parallel import data_mesh, data_parallel, state_shardings
 from rein3d_jax.restore.wan.training.memory import GIB, Workload, require_fit
 
 
-def train(config: WanTrainConfig, *, resume: bool = False) -> WanState:
-    """Run to config.steps; returns the last state. Raises InputError for what is wrong with the input, for what no
+def train_wan(config: WanTrainConfig, *, resume: bool = False) -> WanState:
+    """Last state of a run to config.steps. Raises InputError for what is wrong with the input, for what no
     device can hold, and where the guard's patience ends."""
     pairs, mesh = open_pairs(config), data_mesh(config.devices)
     _check(config, pairs, mesh.size)
-    step = data_parallel(make_step(config), mesh, backend=config.backend, axis=1, sharded=config.sharded)
+    step = data_parallel(make_wan_step(config), mesh, backend=config.backend, axis=1, sharded=config.sharded)
     with TrainingCheckpoints(Path(config.output) / "checkpoints") as checkpoints:
         state = _first_state(config, checkpoints, resume)
         # Laid over the mesh as the step returns it: another layout would compile the step a second time.
-        layout = spread(mesh, state) if config.sharded else NamedSharding(mesh, PartitionSpec())
+        layout = state_shardings(mesh, state) if config.sharded else NamedSharding(mesh, PartitionSpec())
         state = jax.device_put(state, layout)
-        hosts = {"host": jax.process_index(), "hosts": jax.process_count()}
+        host, hosts = jax.process_index(), jax.process_count()
         with WanRun(config, pairs, checkpoints, int(state.train.step)) as run:
-            for batch in batches(pairs, run.step, config, **hosts):
+            for batch in pair_batches(pairs, run.step, config, host=host, hosts=hosts):
                 state, metrics = step(state, batch)
                 run.after(state, metrics)
     return state
@@ -45,11 +45,9 @@ def train(config: WanTrainConfig, *, resume: bool = False) -> WanState:
 
 def _check(config: WanTrainConfig, pairs: PairDataset, devices: int) -> None:
     """Prints what the run needs of each device's memory."""
-    part, rest = divmod(config.batch // config.accumulate, devices)
-    if rest:
-        raise InputError(f"batch {config.batch} / accumulate {config.accumulate} does not divide by {devices} devices")
-    memory = {"trainable": config.trainable, "shards": devices if config.sharded else 1}
-    work = Workload(*pairs[0].degraded.alpha.shape, batch=part, train=True, **memory)
+    clips, shards = clips_per_device(config, devices), devices if config.sharded else 1
+    shape = pairs[0].degraded.alpha.shape
+    work = Workload(*shape, batch=clips, train=True, trainable=config.trainable, shards=shards)
     capacity = device_memory()
     need = require_fit(config.network, work, capacity)
     print(f"memory a device: {need.total / GIB:.1f} GiB foreseen of {capacity / GIB:.1f} GiB", flush=True)
@@ -62,10 +60,8 @@ def device_memory() -> int:
 
 
 def _first_state(config: WanTrainConfig, checkpoints: TrainingCheckpoints, resume: bool) -> WanState:
-    last = checkpoints.last()
-    if last is not None and not resume:
-        raise InputError(f"{config.output} holds a run of {last} steps: --resume it, or choose another output")
+    last = last_step(config, checkpoints, resume)
     random = config.weights is None
     params = random_wan(config.seed, config.network) if random else read_wan(config.weights, config.network)
-    state = jax.tree.map(np.asarray, start(params, config))  # NumPy's arrays may be laid over any devices
+    state = jax.tree.map(np.asarray, initial_wan_state(params, config))  # NumPy's arrays may be laid over any devices
     return state if last is None else state.replace(train=checkpoints.restore(last, state.train))

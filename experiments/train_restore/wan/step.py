@@ -8,18 +8,18 @@ import jax.numpy as jnp
 from flax import struct
 
 from experiments.train_restore.guarded_step import TrainState, first_state, guarded_step
-from experiments.train_restore.wan_config import WanTrainConfig
-from experiments.train_restore.wan_data import Clips
+from experiments.train_restore.wan.config import WanTrainConfig
+from experiments.train_restore.wan.data import PairBatch
 from rein3d_jax.parallel.data_parallel import Total
 from rein3d_jax.restore.wan.dit import Dit
 from rein3d_jax.restore.wan.restore import WanParams
-from rein3d_jax.restore.wan.training.objective import flow_loss, target_of
+from rein3d_jax.restore.wan.training.objective import flow_loss, flow_target
 from rein3d_jax.restore.wan.training.trainable import assemble, start_training
 from rein3d_jax.restore.wan.vae import Vae
 
 
 @struct.dataclass
-class Fixed:
+class FixedState:
     """What a step needs and no step changes."""
 
     frozen: Any  # what `start_training` leaves of the transformer
@@ -30,33 +30,36 @@ class Fixed:
 
 @struct.dataclass
 class WanState:
+    """State of training the full-size network."""
+
     train: TrainState  # what a checkpoint holds
-    fixed: Fixed
+    fixed: FixedState
 
 
-def start(params: WanParams, config: WanTrainConfig) -> WanState:
-    """The state before the first step."""
+def initial_wan_state(params: WanParams, config: WanTrainConfig) -> WanState:
+    """State before the first step."""
     trained, frozen = start_training(jax.random.key(config.seed), params.dit, config.trainable)
-    train = first_state(trained, config.optimizer, config.steps)
-    return WanState(train, Fixed(frozen, params.vae, params.text, params.no_text))
+    train = first_state(trained, config)
+    return WanState(train, FixedState(frozen, params.vae, params.text, params.no_text))
 
 
-def make_step(config: WanTrainConfig):
+def make_wan_step(config: WanTrainConfig):
     """step(state, batch, total) -> (state, metrics), as `data_parallel` takes it."""
-    options = {"config": config.optimizer, "guard": config.guard, "steps": config.steps}
 
-    def step(state: WanState, batch: Clips, total: Total):
-        loss = partial(clips_loss, fixed=state.fixed, config=config)
-        train, metrics = guarded_step(state.train, batch, total, loss=loss, **options)
+    def step(state: WanState, batch: PairBatch, total: Total):
+        loss = partial(pairs_loss, fixed=state.fixed, config=config)
+        train, metrics = guarded_step(state.train, batch, total, loss=loss, config=config)
         return state.replace(train=train), metrics
 
     return step
 
 
-def clips_loss(trained: Any, clips: Clips, *, fixed: Fixed, config: WanTrainConfig) -> tuple[jax.Array, jax.Array]:
-    """(sum of penalties, sum of weights) of clips (b, ...). Each room is turned at random before it is encoded."""
-    keys = jax.vmap(jax.random.split)(jax.random.wrap_key_data(clips.seed))
-    clean, rgb, alpha = jax.vmap(_turned)(keys[:, 0], (clips.clean, clips.rgb, clips.alpha))
+def pairs_loss(
+    trained: Any, pairs: PairBatch, *, fixed: FixedState, config: WanTrainConfig
+) -> tuple[jax.Array, jax.Array]:
+    """Sum of penalties and sum of weights of pairs (b, ...). Each room gets a random yaw before it is encoded."""
+    keys = jax.vmap(jax.random.split)(jax.random.wrap_key_data(pairs.seed))
+    clean, rgb, alpha = jax.vmap(_yawed)(keys[:, 0], (pairs.clean, pairs.rgb, pairs.alpha))
     network, vae = config.network, Vae(config.network.vae)
 
     @jax.jit  # traced once for five videos
@@ -68,17 +71,16 @@ def clips_loss(trained: Any, clips: Clips, *, fixed: Fixed, config: WanTrainConf
         return Dit(network.dit).apply({"params": params}, x, timestep, text, control)
 
     params = assemble(trained, fixed.frozen, config.trainable)
-    target = target_of(encode, clean, rgb, alpha, stride=network.vae.stride)
+    target = flow_target(encode, clean, rgb, alpha, stride=network.vae.stride)
     return flow_loss(predict, target, keys[:, 1], config.objective)
 
 
-def adapted(trained: Any, state: WanState, config: WanTrainConfig) -> WanParams:
-    """Ordinary parameters, for sampling and saving, of `trained`: the state's parameters or their average."""
-    fixed = state.fixed
+def adapted(trained: Any, fixed: FixedState, config: WanTrainConfig) -> WanParams:
+    """Parameters for sampling and saving, of `trained`, a state's parameters or their average."""
     return WanParams(assemble(trained, fixed.frozen, config.trainable), fixed.vae, fixed.text, fixed.no_text)
 
 
-def _turned(key: jax.Array, images: tuple[jax.Array, ...]) -> tuple[jax.Array, ...]:
-    """Panoramas (t, h, w, ...) turned by the same random number of columns."""
+def _yawed(key: jax.Array, images: tuple[jax.Array, ...]) -> tuple[jax.Array, ...]:
+    """Panoramas (t, h, w, ...) rolled by the same random number of columns."""
     columns = jax.random.randint(key, (), 0, images[0].shape[2])
     return tuple(jnp.roll(image, columns, axis=2) for image in images)

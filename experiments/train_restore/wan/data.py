@@ -1,5 +1,5 @@
-"""Which pairs a step of the full-size network sees: a function of the seed and the step alone, so that a resumed run
-sees what it would have. Each time round the pairs come in a new order."""
+"""Batches of pairs: a function of the seed and the step alone, so that a resumed run gets the same ones. Each epoch has
+its own order."""
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -8,7 +8,7 @@ import jax
 import numpy as np
 from flax import struct
 
-from experiments.train_restore.wan_config import WanTrainConfig
+from experiments.train_restore.wan.config import WanTrainConfig
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.pairs.pair_shard import PairDataset
 from rein3d_jax.restore.wan.restore import require_size
@@ -17,7 +17,7 @@ from rein3d_jax.scene import Pair
 
 
 @struct.dataclass
-class Clips:
+class PairBatch:
     """Pairs, with any leading axes, and the randomness of each. sRGB in [0, 1]."""
 
     clean: jax.Array  # (..., t, h, w, 3)
@@ -26,35 +26,35 @@ class Clips:
     seed: jax.Array  # (..., 2) uint32 key data
 
 
-def batches(
+def pair_batches(
     pairs: PairDataset, first: int, config: WanTrainConfig, *, host: int = 0, hosts: int = 1
-) -> Iterator[Clips]:
-    """This host's share (accumulate, b, ...) of steps `first` on, NumPy; the next is read while one is at work."""
+) -> Iterator[PairBatch]:
+    """This host's shares (accumulate, b, ...) of steps `first` on, NumPy; the next is read while one is at work."""
     with ThreadPoolExecutor(1) as reader:
-        coming = reader.submit(batch, pairs, first, config, host, hosts)
+        coming = reader.submit(pair_batch, pairs, first, config, host, hosts)
         for step in range(first + 1, config.steps + 1):
             ready = coming.result()
-            coming = reader.submit(batch, pairs, step, config, host, hosts)
+            coming = reader.submit(pair_batch, pairs, step, config, host, hosts)
             yield ready
 
 
-def batch(pairs: PairDataset, step: int, config: WanTrainConfig, host: int, hosts: int) -> Clips:
-    """The share of one step."""
+def pair_batch(pairs: PairDataset, step: int, config: WanTrainConfig, host: int, hosts: int) -> PairBatch:
+    """This host's share of one step."""
     share = slice(host * config.batch // hosts, (host + 1) * config.batch // hosts)
     random = np.random.default_rng((config.seed, step))
     seeds = random.integers(0, 2**32, (config.batch, 2), np.uint32)[share]
     chosen = [_place(index, pairs, config) for index in range(step * config.batch, (step + 1) * config.batch)][share]
-    clips = [clip_of(pairs[index], seed) for index, seed in zip(chosen, seeds, strict=True)]
+    clips = [seeded_pair(pairs[index], seed) for index, seed in zip(chosen, seeds, strict=True)]
     return jax.tree.map(lambda *x: np.stack(x).reshape(config.accumulate, -1, *x[0].shape), *clips)
 
 
-def clip_of(pair: Pair, seed: np.ndarray) -> Clips:
+def seeded_pair(pair: Pair, seed: np.ndarray) -> PairBatch:
     """One pair as the network's training takes it."""
-    return Clips(pair.clean.rgb, pair.degraded.rgb, pair.degraded.alpha, seed)
+    return PairBatch(pair.clean.rgb, pair.degraded.rgb, pair.degraded.alpha, seed)
 
 
 def open_pairs(config: WanTrainConfig) -> PairDataset:
-    """Raises InputError where there are too few pairs, or where they are not of whole tokens."""
+    """Pairs of config.data. Raises InputError where there are too few pairs, or where they are not of whole tokens."""
     pairs = PairDataset(config.data.folder)
     if len(pairs) <= config.data.held_out:
         raise InputError(f"{pairs.folder} holds {len(pairs)} pairs, and data.held_out takes {config.data.held_out}")
@@ -66,7 +66,7 @@ def open_pairs(config: WanTrainConfig) -> PairDataset:
 
 
 def _place(index: int, pairs: PairDataset, config: WanTrainConfig) -> int:
-    """The pair that is `index`th to be trained on."""
+    """Number of the pair that is `index`th to be trained on."""
     count = len(pairs) - config.data.held_out
-    turn, place = divmod(index, count)
-    return config.data.held_out + int(np.random.default_rng((config.seed, turn)).permutation(count)[place])
+    epoch, place = divmod(index, count)
+    return config.data.held_out + int(np.random.default_rng((config.seed, epoch)).permutation(count)[place])

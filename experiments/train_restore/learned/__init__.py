@@ -1,0 +1,1 @@
+"""Training of the learned restorer, the small network."""

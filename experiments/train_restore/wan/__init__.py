@@ -1,0 +1,1 @@
+"""Training of the full-size network, Wan2.1-VACE."""
