@@ -20,7 +20,7 @@ _EQUAL = 1e-3  # metres: less is rounding, which must not decide
 
 @dataclass(frozen=True)
 class CameraPlace:
-    """A place for a camera."""
+    """A place where a camera can stand."""
 
     eye: np.ndarray  # (3,) metres, in the scene's world
     clearance: float  # metres, horizontally, to the nearest thing at any of three heights

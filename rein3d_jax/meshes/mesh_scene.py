@@ -42,7 +42,7 @@ class MeshScene:
         return self.caster.bounds - self.origin
 
     def cast(self, origins: np.ndarray, rays: np.ndarray) -> Hits:
-        """What unit rays (n, 3) from origins (n, 3) or (3,) meet first."""
+        """First hits of unit rays (n, 3) from origins (n, 3) or (3,)."""
         return self.caster.cast(np.asarray(origins, np.float64) + self.origin, np.asarray(rays, np.float64))
 
     def trace(self, world_from_camera: np.ndarray, height: int, *, samples: int = 3) -> tuple[np.ndarray, np.ndarray]:
@@ -100,7 +100,7 @@ class MeshScene:
 
 
 def mesh_scene(path: str | Path, soup: Triangles, missing: tuple[str, ...] = ()) -> MeshScene:
-    """The soup that was read from `path`, ready to be traced. Raises InputError without embreex."""
+    """Scene of the soup that was read from `path`. Raises InputError without embreex."""
     return MeshScene(str(path), soup, RayCaster(soup.corners), np.zeros(3), missing)
 
 

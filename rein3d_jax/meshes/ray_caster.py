@@ -11,7 +11,7 @@ from rein3d_jax.meshes.triangles import plane_normals
 
 @dataclass(frozen=True)
 class Hits:
-    """What n rays meet first."""
+    """First hits of n rays."""
 
     triangle: np.ndarray  # (n,) int, -1 = nothing
     distance: np.ndarray  # (n,) float64 metres, 0 where nothing
@@ -34,7 +34,7 @@ class RayCaster:
         TriangleMesh(self._scene, (corners - self._centre).astype(np.float32))
 
     def cast(self, origins: np.ndarray, rays: np.ndarray) -> Hits:
-        """origins (n, 3) or (3,), unit rays (n, 3)."""
+        """First hits of unit rays (n, 3) from origins (n, 3) or (3,)."""
         starts = np.broadcast_to(origins - self._centre, rays.shape)
         triangle = self._scene.run(np.array(starts, np.float32), np.array(rays, np.float32)).astype(np.int64)
         hit = np.flatnonzero(triangle >= 0)

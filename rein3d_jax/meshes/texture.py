@@ -14,12 +14,12 @@ class Texture:
 
     @property
     def texels(self) -> int:
-        """How many texels the full picture has."""
+        """Number of texels of the full picture."""
         return self.levels[0].shape[0] * self.levels[0].shape[1]
 
 
 def texture(picture: np.ndarray) -> Texture:
-    """(h, w, 3) uint8 sRGB -> the picture with its halvings."""
+    """Texture of a picture (h, w, 3), uint8 sRGB."""
     assert picture.dtype == np.uint8 and picture.shape[2:] == (3,), (picture.dtype, picture.shape)
     levels = [np.ascontiguousarray(picture)]
     while max(levels[-1].shape[:2]) > 1:

@@ -16,7 +16,7 @@ _Z_UP_FROM_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 @dataclass(frozen=True)
 class Triangles:
-    """n triangles; two-sided, opaque."""
+    """A soup of n triangles; two-sided, opaque."""
 
     corners: np.ndarray  # (n, 3, 3) float64 metres
     uv: np.ndarray  # (n, 3, 2) float32, 0 where plain
@@ -69,12 +69,12 @@ def transformed(soup: Triangles, pose: np.ndarray) -> Triangles:
 
 
 def z_up(soup: Triangles) -> Triangles:
-    """(x, y, z) with Y up -> (x, -z, y)."""
+    """The soup with Z up of one with Y up: (x, -z, y)."""
     return replace(soup, corners=soup.corners @ _Z_UP_FROM_Y_UP.T)
 
 
 def plane_normals(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """corners (n, 3, 3) of triangles with an area -> unit normals (n, 3) and areas (n,)."""
+    """Unit normals (n, 3) and areas (n,) of triangles with corners (n, 3, 3) and an area."""
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     doubled = np.linalg.norm(across, axis=1)
     return across / doubled[:, None], doubled / 2

@@ -28,7 +28,7 @@ def colour_range(distance: np.ndarray, valid: np.ndarray) -> tuple[float, float]
 
 
 def colour_map(distance: np.ndarray, valid: np.ndarray, near: float, far: float) -> np.ndarray:
-    """(...) metres, (...) bool -> (..., 3) float32 sRGB in [0, 1]; beyond near and far the end colours go on."""
+    """Colours (..., 3), float32 sRGB in [0, 1], of `distance` (...) metres, clipped to near and far."""
     valid = np.asarray(valid, bool)
     share = (np.where(valid, distance, near) - near) / max(far - near, np.finfo(np.float32).eps)
     stops = np.linspace(0, 1, len(VIRIDIS))

@@ -14,7 +14,7 @@ _WALLS, _SAFE, _PATH, _VIEW, _ORIGIN = "#5b6670", "#bfe3d0", "#1f7a8c", "#c8553d
 
 @dataclass(frozen=True)
 class FloorMap:
-    """World positions on the floor plane, (x, y) metres."""
+    """The map's lines and points: world positions on the floor plane, (x, y) metres."""
 
     walls: np.ndarray  # (m, 2) outline of the nearest surfaces at eye height
     safe: np.ndarray  # (k, 2) outline of where a camera's centre may be

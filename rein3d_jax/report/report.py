@@ -61,7 +61,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Report:
-    """What the page holds, in the order it is read. Parts left empty are left out."""
+    """Contents of the page, in the order it is read. Parts left empty are left out."""
 
     title: str
     summary: str

@@ -45,9 +45,8 @@ def scatter_chart(scatter: Scatter) -> str:
     frame = axes(*places, (scatter.cost_label, scatter.merit_label), grid=True)
     drawn = "".join(_mark(mark, colour, across, up) for mark, colour in zip(marks, colours, strict=True))
     label = escape(f"{scatter.title}: {scatter.merit_label} by {scatter.cost_label}")
-    return (
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{label}">{frame}{drawn}</svg>'
-        + legend([(_legend_text(mark), colour) for mark, colour in zip(marks, colours, strict=True)])
+    return f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{label}">{frame}{drawn}</svg>' + legend(
+        [(_legend_text(mark), colour) for mark, colour in zip(marks, colours, strict=True)]
     )
 
 

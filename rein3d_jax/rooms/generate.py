@@ -77,7 +77,7 @@ def _textures(key: jax.Array, kind: jax.Array, furniture: Furniture) -> Textures
 
 
 def texture_groups_of(furniture: Furniture) -> jax.Array:
-    """(SLOTS, MAX_TEXTURES) what each piece is made of, as indices into materials.GROUPS."""
+    """What each piece is made of (SLOTS, MAX_TEXTURES), as indices into materials.GROUPS."""
     return jnp.asarray(texture_groups())[furniture.piece]
 
 

@@ -64,8 +64,9 @@ def _window(openings: Openings, index: int) -> tuple[jax.Array, jax.Array, jax.A
 
 
 def reflected(plan: Plan, lights: Lights, textures: Textures, boost: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """(ambient (2, 3) from below and from above, mean radiosity (3,)): a closed room of area A and mean reflectance
-    rho, lit by the flux P, sends rho P / A / (1 - rho) from every wall; floor and ceiling by their own colours."""
+    """Ambient light (2, 3) from below and from above, and mean radiosity (3,): a closed room of area A and mean
+    reflectance rho, lit by the flux P, sends rho P / A / (1 - rho) from every wall; floor and ceiling in their
+    colours."""
     x, y, z = plan.high - plan.low
     areas = jnp.stack([x * y, x * y, y * z, x * z, y * z, x * z])
     shell = textures.ramp[:6, 1]

@@ -50,7 +50,7 @@ def draw_plan(key: jax.Array, kind: jax.Array) -> Plan:
 
 
 def structure_footprints(plan: Plan) -> Footprint:
-    """(STRUCTURE,) where structure stands."""
+    """Footprints (STRUCTURE,) of the structure."""
     return upright_box(plan.structure_low, plan.structure_high, plan.low[2])
 
 

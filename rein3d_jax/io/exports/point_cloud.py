@@ -21,11 +21,11 @@ class Points:
     colours: np.ndarray  # (n, 3) uint8 sRGB
 
 
-def points_of(gaussians: Gaussians, most: int) -> Points:
+def points_of(gaussians: Gaussians, limit: int) -> Points:
     """The centres of the scene's splats that cover more than half of what is behind them, evenly thinned to at most
-    `most`; their colours without what depends on the view."""
+    `limit`; their colours without what depends on the view."""
     chosen = np.flatnonzero(np.asarray(gaussians.alive) & (np.asarray(gaussians.opacity_logits) > 0))
-    chosen = chosen[np.linspace(0, len(chosen) - 1, min(most, len(chosen))).astype(int)]
+    chosen = chosen[np.linspace(0, len(chosen) - 1, min(limit, len(chosen))).astype(int)]
     colours = 0.5 + C0 * np.asarray(gaussians.sh)[chosen, 0]
     return Points(np.asarray(gaussians.means, np.float64)[chosen], to_uint8(colours))
 

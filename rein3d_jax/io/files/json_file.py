@@ -11,7 +11,7 @@ _MAX_BYTES = 512 * 2**20  # a parsed file takes several times its size
 
 
 def read_json(path: Path) -> Any:
-    """What `path` holds. Raises InputError if it is missing, larger than _MAX_BYTES, or no JSON."""
+    """Parsed JSON of `path`. Raises InputError if it is missing, larger than _MAX_BYTES, or no JSON."""
     require_file(path)
     if (size := path.stat().st_size) > _MAX_BYTES:
         raise InputError(f"{path} has {size} bytes, more than {_MAX_BYTES}: give the scene's own JSON file")
@@ -23,7 +23,7 @@ def read_json(path: Path) -> Any:
 
 
 def path_within(folder: Path, name: str, *, named_by: Path) -> Path:
-    """The file `name` of `folder`. Raises InputError, naming `named_by`, unless it stays path_within: no absolute path,
+    """The file `name` of `folder`. Raises InputError, naming `named_by`, unless it stays inside: no absolute path,
     no "..", no link that leads out, no address."""
     try:
         stays = "://" not in name and (folder / name).resolve().is_relative_to(folder.resolve())

@@ -31,7 +31,7 @@ _READ_HEADER = {(1, 0): npy_format.read_array_header_1_0, (2, 0): npy_format.rea
 
 
 class Header(NamedTuple):
-    """What a stored array says of itself."""
+    """Shape and type of a stored array."""
 
     shape: tuple[int, ...]
     dtype: np.dtype

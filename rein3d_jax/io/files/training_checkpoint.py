@@ -17,9 +17,9 @@ class TrainingCheckpoints:
     """States by step in one folder. A context manager: leaving it waits for what is still being written."""
 
     def __init__(self, folder: str | Path):
-        keep = AnyPreservationPolicy([LatestN(1), BestN(get_metric_fn=lambda m: m[_SCORE], n=1)])
+        policy = AnyPreservationPolicy([LatestN(1), BestN(get_metric_fn=lambda m: m[_SCORE], n=1)])
         options = ocp.CheckpointManagerOptions(
-            preservation_policy=keep, best_fn=lambda metrics: metrics[_SCORE], enable_async_checkpointing=True
+            preservation_policy=policy, best_fn=lambda metrics: metrics[_SCORE], enable_async_checkpointing=True
         )
         self.folder = Path(folder).absolute()
         self.manager = ocp.CheckpointManager(self.folder, options=options)
@@ -44,7 +44,7 @@ class TrainingCheckpoints:
         return self.manager.best_step()
 
     def best_score(self) -> float:
-        """Its score; -inf where there is none."""
+        """The greatest score; -inf where there is none."""
         best = self.best()
         return -float("inf") if best is None else float(self.manager.metrics(best)[_SCORE])
 

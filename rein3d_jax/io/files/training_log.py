@@ -1,4 +1,4 @@
-"""What a training run says of itself: a line of JSON for each record, and TensorBoard events of the same numbers."""
+"""Log of a training run: a line of JSON for each record, and TensorBoard events of the same numbers."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,7 @@ class TrainingLog:
         self.events.close()
 
     def record(self, step: int, values: dict[str, float]) -> None:
-        """The numbers of one step; those that are not finite become null in the JSON."""
+        """Logs the numbers of one step; those that are not finite become null in the JSON."""
         plain = {name: float(value) for name, value in values.items()}
         finite = {name: value if np.isfinite(value) else None for name, value in plain.items()}
         with open(self.lines, "a", encoding="utf-8") as lines:
@@ -32,5 +32,5 @@ class TrainingLog:
             self.events.add_scalar(name, value, step)
 
     def picture(self, step: int, name: str, rgb: np.ndarray) -> None:
-        """An sRGB picture (h, w, 3) in [0, 1]."""
+        """Logs an sRGB picture (h, w, 3) in [0, 1]."""
         self.events.add_image(name, np.moveaxis(np.clip(rgb, 0, 1), -1, 0), step)

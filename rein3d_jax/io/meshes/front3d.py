@@ -3,7 +3,7 @@ floors, ceilings) and models; rooms say which, and where models stand.
 
 A model's vertices v go to R(rot) (scale * v) + pos, rot being the quaternion x, y, z, w, and meshes stand where they
 are; all in metres with Y up. So 3D-FRONT-ToolBox (scripts/utils.py: transform_v, quaternion_to_matrix;
-scripts/scene.py) places them; BlenderProc's Front3DLoader swaps two axes of the meshes instead of turning them, which
+scripts/scene.py) places them; BlenderProc's Front3DLoader swaps two axes of the meshes instead of rotating them, which
 mirrors the house, and is not followed. Texture coordinates are multiplied by the upper left 2 x 2 of the material's
 UVTransform. A model is <models>/<jid>/raw_model.obj with its model.mtl and texture.png; a material's texture is
 <textures>/<jid>/texture.png, and is never downloaded: without it the material's colour stands in, and
@@ -71,7 +71,7 @@ class _House:
     def parts(self, room: str | None) -> list[Triangles]:
         meshes = {mesh["uid"]: mesh for mesh in self.data["mesh"]}
         materials = {material["uid"]: material for material in self.data.get("material", ())}
-        # The toolbox wants "valid" to be true, BlenderProc never asks: what is not said to be invalid is looked for.
+        # The toolbox wants "valid" to be true, BlenderProc never asks: what is not said to be invalid is searched for.
         furniture = {item["uid"]: item["jid"] for item in self.data.get("furniture", ()) if item.get("valid", True)}
         parts = []
         for child in self._children(room):

@@ -11,12 +11,12 @@ from rein3d_jax.io.files.atomic import write_bytes
 from rein3d_jax.io.pictures.image import to_uint8
 
 _MEND = "pip install 'rein3d-jax[export]'"
-_Y_UP_FROM_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # glTF's, as Blender turns it back
+_Y_UP_FROM_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # glTF's, as Blender undoes it
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangles whose fronts look into free space, Z up."""
+    """Triangles whose fronts face free space, Z up."""
 
     vertices: np.ndarray  # (v, 3) metres
     faces: np.ndarray  # (f, 3) int
@@ -26,16 +26,16 @@ class Surface:
 def surface(
     signed: np.ndarray, known: np.ndarray, rgb: np.ndarray, low: np.ndarray, voxel: float, *, jump: float = np.inf
 ) -> Surface:
-    """Where `signed` (x, y, z) metres passes 0 between samples that are all `known` and differ by less than `jump`:
-    a larger one is no surface, but the outline of something before an unseen place. The first sample is at `low` (3,),
-    the others `voxel` metres apart. Raises InputError without scikit-image, or where there is no surface."""
+    """Surface where `signed` (x, y, z) metres passes 0 between samples that are all `known` and differ by less than
+    `jump`: a larger one is the outline of something before an unseen place. The first sample is at `low` (3,), the
+    others `voxel` metres apart. Raises InputError without scikit-image, or where there is no surface."""
     try:
         from skimage.measure import marching_cubes
     except ImportError as error:
         raise InputError(f"a mesh needs scikit-image and trimesh: {_MEND}") from error
     signed = np.array(signed)  # scikit-image wants it writable
-    least, most = _of_cells(signed, np.minimum), _of_cells(signed, np.maximum)
-    cells = _of_cells(np.asarray(known), np.logical_and) & (most - least < jump)
+    low_corner, high_corner = _of_cells(signed, np.minimum), _of_cells(signed, np.maximum)
+    cells = _of_cells(np.asarray(known), np.logical_and) & (high_corner - low_corner < jump)
     if not (cells.any() and signed.min() < 0 < signed.max()):
         raise InputError("the scene has no surface that could become a mesh: render it from nearer, or lower --voxel")
     # Its mask is asked at the sample where a cell ends.
@@ -51,10 +51,10 @@ def without_islands(found: Surface, area: float) -> Surface:
     trimesh = _trimesh()
     mesh = trimesh.Trimesh(found.vertices, found.faces, process=False)
     groups = trimesh.graph.connected_components(mesh.face_adjacency, nodes=np.arange(len(found.faces)))
-    kept = [group for group in groups if mesh.area_faces[group].sum() >= area]
-    if not kept:
+    large = [group for group in groups if mesh.area_faces[group].sum() >= area]
+    if not large:
         raise InputError(f"no part of the mesh has {area} square metres: lower --island")
-    faces = found.faces[np.sort(np.concatenate(kept))]
+    faces = found.faces[np.sort(np.concatenate(large))]
     used, numbered = np.unique(faces, return_inverse=True)
     return Surface(found.vertices[used], numbered.reshape(faces.shape), found.colours[used])
 

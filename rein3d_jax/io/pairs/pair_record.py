@@ -19,7 +19,7 @@ _MAX_BYTES = 2**31  # of one record: a paper-sized clip (41 frames, 448 x 896) t
 
 
 def encode_pair(pair: Pair) -> bytes:
-    """The same pair gives the same bytes."""
+    """Bytes of a pair; the same pair gives the same bytes."""
     buffer = io.BytesIO()
     arrays = {
         "clean_rgb": _levels(pair.clean.rgb),

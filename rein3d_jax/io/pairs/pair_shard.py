@@ -1,6 +1,6 @@
 """Shards of a dataset of pairs: ArrayRecord files, and beside each a JSON that says what it must hold.
 
-    NAME.array_record   records of io/pair_record.py
+    NAME.array_record   records of pair_record.py
     NAME.json           {"clips": count, "sha256": of the file, "bytes": its size, ...what the builder adds}
 
 The JSON is written last: a shard without one is unfinished.
@@ -43,7 +43,7 @@ def write_shard(path: Path, pairs: Iterable[Pair], about: dict[str, Any]) -> dic
 
 
 def shard_fault(path: Path, described: dict[str, Any]) -> str | None:
-    """What is wrong with the shard at `path` by its description, or None: one line that names it."""
+    """One line about what is wrong with the shard at `path` by its description, or None."""
     try:
         size = path.stat().st_size
     except OSError as error:

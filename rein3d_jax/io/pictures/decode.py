@@ -20,7 +20,7 @@ _MEND = f"give a JPEG, PNG, EXR or HDR file of at most {MAX_COLUMNS} columns"
 def open_image(path: Path) -> Iterator[oiio.ImageInput]:
     """The opened file, its header read and its pixels not: `.spec()` says sizes, channels and types.
 
-    Raises InputError if it is missing, is no picture, is larger than MAX_COLUMNS, or is cropped or turned.
+    Raises InputError if it is missing, is no picture, is larger than MAX_COLUMNS, or is cropped or rotated.
     """
     require_file(path)
     # A progressive JPEG is decoded whole when it is opened, so the limit must hold inside OpenImageIO.
@@ -53,7 +53,7 @@ def read_pixels(path: Path, image: oiio.ImageInput, kind: str) -> np.ndarray:
 
 
 def read_credit(path: Path) -> str:
-    """Who made the picture, and what they allow, as its header has it in one line; "" where it says nothing. Raises
+    """Author and licence of the picture as its header has them, in one line; "" where it has none. Raises
     InputError as `open_image` does."""
     with open_image(path) as image:
         said = (image.spec().get_string_attribute(name) for name in ("Artist", "Copyright"))
@@ -65,8 +65,8 @@ def _check_whole_and_upright(path: Path, spec: oiio.ImageSpec) -> None:
     if window != (spec.full_x, spec.full_y, spec.full_width, spec.full_height):
         whole = f"{spec.full_width}x{spec.full_height}"
         raise InputError(f"{path} stores {spec.width}x{spec.height} of a {whole} picture: save it uncropped")
-    if (turn := spec.get_int_attribute("Orientation", 1)) != 1:
-        raise InputError(f"{path} is stored turned (EXIF orientation {turn}): save it upright")
+    if (orientation := spec.get_int_attribute("Orientation", 1)) != 1:
+        raise InputError(f"{path} is stored rotated (EXIF orientation {orientation}): save it upright")
 
 
 def _first_line(error: str) -> str:

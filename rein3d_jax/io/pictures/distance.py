@@ -35,7 +35,7 @@ def read_distance(path: str | Path, shape: tuple[int, int]) -> tuple[np.ndarray,
 
 
 def write_distance_exr(path: str | Path, distance: np.ndarray) -> None:
-    """Distance (h, w) metres, 0 where unknown, to a float32 EXR file with the channel Y, atomically.
+    """Writes distance (h, w) metres, 0 where unknown, to a float32 EXR file with the channel Y, atomically.
     The same distance gives the same bytes. Raises InputError."""
     write_exr(path, {"Y": distance})
 

@@ -11,13 +11,13 @@ from rein3d_jax.io.files.atomic import atomic_path
 
 
 def write_rgb_exr(path: str | Path, rgb: np.ndarray) -> None:
-    """A picture (h, w, 3), sRGB in [0, 1], as linear light, atomically. Raises InputError."""
+    """Writes a picture (h, w, 3), sRGB in [0, 1], as linear light, atomically. Raises InputError."""
     linear = linear_from_srgb(np.clip(np.asarray(rgb, np.float32), 0, 1))
     write_exr(path, dict(zip("RGB", np.moveaxis(linear, -1, 0), strict=True)))
 
 
 def write_exr(path: str | Path, channels: Mapping[str, np.ndarray]) -> None:
-    """Channels (h, w) by name, atomically. Raises InputError."""
+    """Writes channels (h, w) by name, atomically. Raises InputError."""
     pixels = np.stack([np.asarray(channel, np.float32) for channel in channels.values()], axis=-1)
     spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], "float")
     spec.channelnames = tuple(channels)

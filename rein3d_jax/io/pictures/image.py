@@ -18,7 +18,7 @@ def read_rgb(path: str | Path, *, panorama: bool = True) -> np.ndarray:
     """Equirectangular picture as float32 sRGB (h, 2 h, 3) in [0, 1]; with `panorama` False, one of any aspect.
 
     JPEG and PNG (8 or 16 bits, grey spread to three channels, alpha dropped) are taken as sRGB; EXR and HDR as
-    linear light, which is exposed and tone-mapped (io/tone.py). Raises InputError, before pixels are allocated
+    linear light, which is exposed and tone-mapped (tone.py). Raises InputError, before pixels are allocated
     where the header tells: missing, no picture, damaged, not 2:1, under MIN_ROWS rows, over MAX_COLUMNS columns.
     """
     path = Path(path)
@@ -34,7 +34,7 @@ def read_rgb(path: str | Path, *, panorama: bool = True) -> np.ndarray:
 def resize_panorama(
     rgb: np.ndarray, distance: np.ndarray | None, valid: np.ndarray | None, height: int
 ) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
-    """rgb (h, 2h, 3), distance (h, 2h) and valid (h, 2h) -> the same at `height` rows; None stays None.
+    """Picture (h, 2h, 3), distance (h, 2h) and its mask (h, 2h) at `height` rows; None stays None.
 
     Colour is averaged over each new pixel's area (bilinear, round the seam and over the poles, when the picture
     grows). Distance and validity are picked at the nearest sample: two surfaces never mix.
@@ -51,24 +51,24 @@ def resize_panorama(
 
 
 def to_uint8(rgb: np.ndarray) -> np.ndarray:
-    """sRGB in [0, 1] of any shape -> bytes, rounded; values outside are clipped."""
+    """Bytes of sRGB in [0, 1] of any shape, rounded; values outside are clipped."""
     rgb = np.asarray(rgb)
     assert np.isfinite(rgb).all(), "a picture must be finite"
     return (np.clip(rgb, 0, 1) * 255 + 0.5).astype(np.uint8)
 
 
 def encode_jpeg(rgb: np.ndarray, quality: int = 92) -> bytes:
-    """sRGB (h, w, 3) in [0, 1] -> the bytes of a JPEG file."""
+    """JPEG file of sRGB (h, w, 3) in [0, 1]."""
     return _encode(".jpg", rgb, [cv2.IMWRITE_JPEG_QUALITY, quality])
 
 
 def encode_png(rgb: np.ndarray) -> bytes:
-    """sRGB (h, w, 3) in [0, 1] -> the bytes of an 8-bit PNG file."""
+    """8-bit PNG file of sRGB (h, w, 3) in [0, 1]."""
     return _encode(".png", rgb, [])
 
 
 def write_rgb(path: str | Path, rgb: np.ndarray) -> None:
-    """sRGB (h, w, 3) in [0, 1] to a PNG or JPEG file, by suffix, atomically. Raises InputError."""
+    """Writes sRGB (h, w, 3) in [0, 1] to a PNG or JPEG file, by suffix, atomically. Raises InputError."""
     encoders = {".png": encode_png, ".jpg": encode_jpeg, ".jpeg": encode_jpeg}
     encode = encoders.get(Path(path).suffix.lower())
     if encode is None:
@@ -104,7 +104,7 @@ def _nearest(size: int, new_size: int) -> np.ndarray:
 
 
 def _enlarge(rgb: np.ndarray, height: int) -> np.ndarray:
-    """Bilinear. One row is padded over each pole (it continues half a turn away) and one column round the seam."""
+    """Bilinear. One row is padded over each pole (it continues 180 degrees away) and one column round the seam."""
     over_pole = np.roll(rgb[[0, -1]], len(rgb), axis=1)
     padded = np.concatenate([over_pole[:1], rgb, over_pole[1:]])
     padded = np.concatenate([padded[:, -1:], padded, padded[:, :1]], axis=1)

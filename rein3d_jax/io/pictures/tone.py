@@ -11,7 +11,7 @@ _DARKEST = 1e-4  # of the median: what sensor noise and black frames may weigh i
 
 
 def tone_map(linear: np.ndarray) -> np.ndarray:
-    """Panorama (h, w, 3) of linear Rec. 709 light in any unit -> sRGB float32 in [0, 1].
+    """sRGB float32 in [0, 1] of a panorama (h, w, 3) of linear Rec. 709 light in any unit.
 
     NaN and negative light count as 0, infinite light as the brightest finite value. The result does not change
     when the input is multiplied by a constant or rotated about the vertical.
@@ -23,7 +23,7 @@ def tone_map(linear: np.ndarray) -> np.ndarray:
 
 
 def finite_light(linear: np.ndarray) -> np.ndarray:
-    """Light of any shape -> the same, finite and not negative, float32."""
+    """Light of any shape, made finite and not negative, float32."""
     linear = np.asarray(linear, np.float32)
     brightest = np.max(linear, initial=0.0, where=np.isfinite(linear))
     return np.maximum(np.nan_to_num(linear, nan=0.0, posinf=brightest, neginf=0.0), 0)
@@ -42,6 +42,6 @@ def exposure(linear: np.ndarray) -> np.float32:
 
 
 def filmic(x: np.ndarray) -> np.ndarray:
-    """x (2.51 x + 0.03) / (x (2.43 x + 0.59) + 0.14), by channel: Narkowicz 2015, "ACES filmic tone mapping
-    curve". Bright saturated lights go towards white, as on film."""
+    """Filmic curve x (2.51 x + 0.03) / (x (2.43 x + 0.59) + 0.14), by channel: Narkowicz 2015, "ACES filmic tone
+    mapping curve". Bright saturated lights go towards white, as on film."""
     return x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)

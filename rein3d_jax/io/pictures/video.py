@@ -19,14 +19,14 @@ _SCALING = Interpolation.AREA | Interpolation.ACCURATE_RND | Interpolation.FULL_
 
 
 def write_mp4(path: str | Path, frames: Iterable[np.ndarray], fps: float) -> None:
-    """Frames (h, w, 3) sRGB in [0, 1], all of one size, to `path`, atomically. An odd size grows by repeating its
-    last row or column (4:2:0 needs even sizes). The same frames give the same bytes, on any number of cores.
-    Raises InputError if there are no frames or the file cannot be written."""
+    """Writes frames (h, w, 3) sRGB in [0, 1], all of one size, to `path`, atomically. An odd size grows by
+    repeating its last row or column (4:2:0 needs even sizes). The same frames give the same bytes on any number of
+    cores. Raises InputError if there are no frames or the file cannot be written."""
     pictures = (_even(to_uint8(frame)) for frame in frames)
     first = next(pictures, None)
     if first is None:
         raise InputError(f"{path} would have no frames: render at least one")
-    # Encoded in memory: files here are small, and a full disk is then told by write_bytes like any other.
+    # Encoded in memory: files here are small, and a full disk is then found by write_bytes as for any other.
     buffer = io.BytesIO()
     with av.open(buffer, "w", format="mp4", options={"fflags": "+bitexact"}) as container:
         stream = _add_stream(container, first.shape, fps)

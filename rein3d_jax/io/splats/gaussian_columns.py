@@ -31,7 +31,7 @@ def alive_columns(gaussians: Gaussians, path: str | Path) -> Columns:
 
 
 def from_columns(columns: Columns, path: str | Path) -> Gaussians:
-    """Every slot alive, quaternions unit. Raises InputError as alive_columns does."""
+    """Gaussians of the columns, every slot alive, quaternions unit. Raises InputError as alive_columns does."""
     means, log_scales, quats, opacity_logits, sh = _checked(columns, path)
     fields = (means, log_scales, quats, opacity_logits, sh, np.ones(len(means), bool))
     return Gaussians(*map(jnp.asarray, fields))

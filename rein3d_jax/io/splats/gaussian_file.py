@@ -25,7 +25,7 @@ _FORMATS: dict[str, tuple[Callable[..., Gaussians], Callable[..., None]]] = {
 
 
 def read_splats(path: str | Path) -> Gaussians:
-    """The scene in `path`, every slot alive, in the axes of io/ply.py. Raises InputError for a suffix that is none of
+    """The scene in `path`, every slot alive, in the axes of ply.py. Raises InputError for a suffix that is none of
     these, and for what the format's reader refuses."""
     return _format(path)[0](path)
 

@@ -4,24 +4,24 @@ import numpy as np
 
 
 def to_levels(unit: np.ndarray, bits: int) -> np.ndarray:
-    """[0, 1] of any shape -> uint32 in [0, 2^bits - 1]; what lies outside is clipped. Off by at most half a level."""
+    """Levels, uint32 in [0, 2^bits - 1], of [0, 1] of any shape, clipped; off by at most half a level."""
     top = (1 << bits) - 1
     return np.floor(np.clip(unit, 0, 1) * np.float64(top) + 0.5).astype(np.uint32)
 
 
 def from_levels(levels: np.ndarray, bits: int) -> np.ndarray:
-    """The inverse, float64: the low `bits` of each level; higher ones are another number's."""
+    """Inverse of to_levels, float64, of the low `bits` of each level; higher ones are another number's."""
     top = (1 << bits) - 1
     return (levels & top) / top
 
 
 def alpha_bytes(logits: np.ndarray) -> np.ndarray:
-    """Opacity logits (...,) -> the opacity as uint8."""
+    """Opacity as uint8 (...) of opacity logits (...)."""
     return to_levels(0.5 + 0.5 * np.tanh(0.5 * logits.astype(np.float64)), 8).astype(np.uint8)
 
 
 def alpha_logits(alphas: np.ndarray) -> np.ndarray:
-    """uint8 (...,) -> logits, float32. 0 and 255 stand for a quarter level from the end, so that logits are finite."""
+    """Opacity logits, float32, of uint8 (...). 0 and 255 stand for a quarter level from the end: logits are finite."""
     alpha = np.clip(alphas.astype(np.float64), 0.25, 254.75) / 255
     return np.log(alpha / (1 - alpha)).astype(np.float32)
 

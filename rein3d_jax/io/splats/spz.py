@@ -3,9 +3,9 @@ a Gaussian. Version 2 is written, 2 and 3 are read.
 
 positions (24-bit fixed point)  opacity (u8)  colour (u8)  log scales (u8, 1/16)  rotation (u8 xyz)  SH (5 and 4 bits)
 
-A rotation may come back turned half round one of the splat's own axes, which is the same splat.
-Axes: SPZ says that it holds right, up, back, and every converter turns a PLY (right, down, front) into it by flipping
-y and z. So does this file: converted to PLY by others, it is the scene.ply that io/ply.py writes, +Z up.
+A rotation may come back 180 degrees about one of the splat's own axes off, which is the same splat.
+Axes: SPZ says that it holds right, up, back, and every converter makes it of a PLY (right, down, front) by flipping
+y and z. So does this file: converted to PLY by others, it is the scene.ply that ply.py writes, +Z up.
 """
 
 import gzip

@@ -33,14 +33,14 @@ _INCEPTION = {
 
 
 def lpips_weights(path: Path = METRIC_WEIGHTS / "lpips_alex.npz") -> dict[str, jax.Array]:
-    """kernel0..4, bias0..4 of AlexNet and head0..4. Raises InputError if the file is missing or damaged."""
+    """Arrays kernel0..4, bias0..4 of AlexNet and head0..4. Raises InputError if the file is missing or damaged."""
     shapes = {f"kernel{i}": (side, side, *channels) for i, (side, *channels) in enumerate(_ALEXNET)}
     shapes |= {f"{name}{i}": (out,) for name in ("bias", "head") for i, (_, _, out) in enumerate(_ALEXNET)}
     return _read(path, shapes, _REINSTALL)
 
 
 def niqe_weights(path: Path = METRIC_WEIGHTS / "niqe.npz") -> dict[str, jax.Array]:
-    """mean (36,) and whitening (36, 36) of pristine pictures. Raises InputError if the file is missing or damaged."""
+    """Arrays mean (36,) and whitening (36, 36) of pristine pictures. Raises InputError as lpips_weights does."""
     return _read(path, {"mean": (_FEATURES,), "whitening": (_FEATURES, _FEATURES)}, _REINSTALL)
 
 

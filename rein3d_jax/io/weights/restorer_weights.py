@@ -24,7 +24,7 @@ def write_restorer(path: str | Path, parameters: dict, sizes: dict[str, int]) ->
 
 
 def read_restorer(path: str | Path = SHIPPED_RESTORER) -> tuple[dict, dict[str, int]]:
-    """(parameters as nested dicts of float32 arrays, the network's sizes). Raises InputError if the file is missing
+    """Parameters as nested dicts of float32 arrays, and the network's sizes. Raises InputError if the file is missing
     or damaged, or is something else."""
     path = Path(path)
     if not path.exists():

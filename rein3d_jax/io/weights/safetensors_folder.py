@@ -28,6 +28,8 @@ _NAMED = 10  # faults that an error names; the others it counts
 
 
 class Row(Protocol):
+    """A row of the table: which tensor is (part of) which leaf, and how."""
+
     leaf: tuple[str, ...]
     index: int | None
     name: str
@@ -147,14 +149,14 @@ def _read_leaf(folder, tensors, rows, leaf):
 def _tensor(row, leaf):
     """The inverse of what a row says."""
     part = np.asarray(leaf if row.index is None else leaf[row.index])
-    turned = part.reshape([row.shape[axis] for axis in row.axes])
-    return np.ascontiguousarray(turned.transpose(np.argsort(row.axes)))
+    part = part.reshape([row.shape[axis] for axis in row.axes])
+    return np.ascontiguousarray(part.transpose(np.argsort(row.axes)))
 
 
-def _shards(rows, leaves, most):
+def _shards(rows, leaves, limit):
     part, size = [], 0
     for row in rows:
-        if part and size + _size(row, leaves) > most:
+        if part and size + _size(row, leaves) > limit:
             yield part
             part, size = [], 0
         part.append(row)

@@ -55,7 +55,7 @@ PLACES = ("wall", "free", "hung", "flat", "ceiling")
 
 
 def program_weights() -> np.ndarray:
-    """(kinds, SLOTS, pieces + 1): the last column is no piece."""
+    """Weights (kinds, SLOTS, pieces + 1); the last column is no piece."""
     table = np.zeros((len(ROOM_KINDS), SLOTS, NO_PIECE + 1), np.float32)
     for kind, name in enumerate(ROOM_KINDS):
         for slot, weights in enumerate(PROGRAMS[name]):
@@ -65,30 +65,30 @@ def program_weights() -> np.ndarray:
 
 
 def size_ranges() -> np.ndarray:
-    """(pieces + 1, 4, 2): width, depth, height, lift in metres; no piece has no size."""
+    """Ranges (pieces + 1, 4, 2) of width, depth, height, lift in metres; no piece has no size."""
     rows = [(p.width, p.depth, p.height, p.lift) for p in PIECES.values()]
     return np.array([*rows, np.zeros((4, 2))], np.float32)
 
 
 def places() -> np.ndarray:
-    """(pieces + 1,) index into PLACES."""
+    """Places (pieces + 1,) as indices into PLACES."""
     return np.array([*(PLACES.index(p.place) for p in PIECES.values()), 0])
 
 
 def texture_groups() -> np.ndarray:
-    """(pieces + 1, MAX_TEXTURES) index into materials.GROUPS; the last one fills up."""
+    """Textures (pieces + 1, MAX_TEXTURES) as indices into materials.GROUPS; the last one fills up."""
     rows = [[GROUP_INDEX[name] for name in p.textures] for p in PIECES.values()]
     assert max(map(len, rows)) <= MAX_TEXTURES
     return np.array([*(row + row[-1:] * (MAX_TEXTURES - len(row)) for row in rows), [0] * MAX_TEXTURES])
 
 
 def part_tables() -> dict[str, np.ndarray]:
-    """For (pieces + 1, MAX_PARTS): bounds (.., 3, 2, 4) in W, D, H, M; shape; texture; casts; chance, 0 for no part."""
+    """Tables (pieces + 1, MAX_PARTS): bounds (.., 3, 2, 4) in W, D, H, M; shape, texture, casts; chance, 0: no part."""
     count = (NO_PIECE + 1, MAX_PARTS)
     bounds, shape, texture = np.zeros((*count, 3, 2, 4), np.float32), np.zeros(count, int), np.zeros(count, int)
     chance, casts = np.zeros(count, np.float32), np.zeros(count, bool)
     for i, (name, piece) in enumerate(PIECES.items()):
-        assert len(piece.parts) <= MAX_PARTS, f"{name} has {len(piece.parts)} parts, {MAX_PARTS} are the most"
+        assert len(piece.parts) <= MAX_PARTS, f"{name} has {len(piece.parts)} parts, {MAX_PARTS} are the limit"
         for j, part in enumerate(piece.parts):
             bounds[i, j] = part.x, part.y, part.z
             shape[i, j], texture[i, j], chance[i, j] = part.shape, part.texture, part.chance

@@ -43,7 +43,7 @@ def footprints_overlap(a: Footprint, b: Footprint) -> jax.Array:
 
 
 def corners(a: Footprint) -> jax.Array:
-    """(..., 4, 2) metres."""
+    """Corners (..., 4, 2) in metres."""
     signs = jnp.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
     offsets = signs * a.half[..., None, :]
     return a.centre[..., None, :] + _einsum("...ki,...ij->...kj", offsets, _axes(a))
