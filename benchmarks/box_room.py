@@ -11,7 +11,7 @@ from rein3d_jax.geometry.poses import rigid
 from rein3d_jax.geometry.shell import RoomShell, meet_shell, world_from_shell
 from rein3d_jax.geometry.sphere import rays_of_pose, world_from_camera_axes
 from rein3d_jax.lift import LiftConfig, lift, with_capacity
-from rein3d_jax.refine import RefineConfig, Views, join_views, views_from_panorama
+from rein3d_jax.refine import Views, ViewsConfig, join_views, views_from_panorama
 from rein3d_jax.scene import Gaussians, Panorama
 
 HEIGHT = 32  # rows of a panorama: 2,048 Gaussians
@@ -66,14 +66,13 @@ def lifted(paint: Paint, *, unit: float = 1.0, spare: float = 1.0, noise: float 
 
 
 def views_of(
-    paint: Paint, config: RefineConfig, *, unit: float = 1.0, tint=lambda source: 0.0, weight=lambda source: 1.0
+    paint: Paint, config: ViewsConfig, *, unit: float = 1.0, tint=lambda source: 0.0, weight=lambda source: 1.0
 ) -> Views:
     """Of the box from the origin (source 0) and from PLACES (sources 1 and 2 by turns)."""
     parts = []
     for index, place in enumerate([np.zeros(3), *PLACES]):
         source = 0 if index == 0 else 1 + index % 2
         rgb, distance, _ = look(place, paint)
-        known = unit * distance if source == 0 else jnp.zeros_like(distance)  # as the pipeline's: the input's alone
-        frame = (rgb + tint(source), weight(source) * jnp.ones_like(distance), known, pose_at(unit * place))
-        parts.append(views_from_panorama(*frame, source=source, turn=0.3 * index, config=config))
+        frame = (rgb + tint(source), weight(source) * jnp.ones_like(distance), pose_at(unit * place))
+        parts.append(views_from_panorama(*frame, yaw=0.3 * index, config=config))
     return join_views(*parts)

@@ -8,6 +8,7 @@ pruned by opacity half-way; densifiers start at 70 % of the budget, by contribut
 
 import argparse
 import json
+from collections import deque
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,13 +20,14 @@ from benchmarks.studies.scene import GROWING, RECIPE, SIZE, Bench, summary
 from experiments.compiled_programs import forget_when_many
 from experiments.config import load_config
 from experiments.evaluate.room import Room, room_folders
-from experiments.reconstruct.__main__ import ReconstructConfig
+from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.quality import is_novel, render_views
 from rein3d_jax.evaluate.metrics import psnr
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.lift import compact
-from rein3d_jax.pipeline.pipeline import WEIGHED, Stages, collect_views, scene_extent
-from rein3d_jax.refine import RefineConfig, Views, refine
+from rein3d_jax.pipeline.refine_scene import collect_views, scene_extent
+from rein3d_jax.pipeline.stages import Stages
+from rein3d_jax.refine import RefineConfig, Views, first_snapshot, refine
 from rein3d_jax.refine.prune import contribution, prune_to
 from rein3d_jax.refine.views import camera_of
 from rein3d_jax.scene import Gaussians
@@ -37,19 +39,21 @@ METHODS = ("opacity", "contribution", "default", "mcmc")
 
 def fit(scene: Gaussians, views: Views, extent: float, config: RefineConfig, stages: Stages) -> Gaussians:
     """`refine` with key 1."""
-    return refine(scene, views, extent, jax.random.key(1), config=config, raster=stages.rasterize)[0]
+    start = first_snapshot(scene, views, extent=extent, config=config, raster=stages.rasterize)
+    last = deque(refine(start, views, jax.random.key(1), config=config, raster=stages.rasterize), maxlen=1)
+    return last[0].scene
 
 
 def scene_of(method: str, count: int, scene: Gaussians, views: Views, extent: float, stages: Stages) -> Gaussians:
     """At most `count` Gaussians, after all of the recipe's steps."""
     config = stages.refine
-    still = replace(config, densify_start=config.steps + 1, spare=0.0)
+    still = replace(config, densification="none", spare=0.0)
     if method == "opacity":
         half = replace(still, steps=config.steps // 2)
         grown = fit(compact(scene, spare=0.0), views, extent, half, stages)
         kept = prune_to(grown, jax.nn.sigmoid(grown.opacity_logits), count)
         return fit(compact(kept, spare=0.0), views, extent, half, stages)
-    cameras = [camera_of(views, int(i)) for i in np.linspace(0, len(views.rgb) - 1, WEIGHED)]
+    cameras = [camera_of(views, int(i)) for i in np.linspace(0, len(views.rgb) - 1, 48)]
     weight = contribution(scene, cameras, config=stages.rasterize)
     if method == "contribution":
         return fit(compact(prune_to(scene, weight, count), spare=0.0), views, extent, still, stages)

@@ -10,6 +10,7 @@ import argparse
 import hashlib
 import itertools
 import json
+from collections import deque
 from pathlib import Path
 from time import perf_counter
 
@@ -20,34 +21,31 @@ import numpy as np
 from experiments.compiled_programs import forget_when_many
 from experiments.config import load_config
 from experiments.evaluate.room import Room, room_folders
-from experiments.reconstruct.__main__ import ReconstructConfig
+from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.quality import is_novel, render_views
 from experiments.restorer_network import read_network
 from rein3d_jax.evaluate.metrics import psnr
 from rein3d_jax.explore.trajectories import radial_trajectories
 from rein3d_jax.io.files.atomic import write_text
-from rein3d_jax.pipeline.pipeline import (
-    Restored,
-    collect_views,
-    lift_scene,
-    refine_scene,
-    restore_trajectory,
-    room_background,
-)
+from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
+from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene
+from rein3d_jax.pipeline.survey import Survey, lift_scene, room_background
+from rein3d_jax.restore import restorer
 from rein3d_jax.scene import Gaussians
 
 RECIPE = "experiments/recipes/quick.toml"
-SIZE = ("input.height=128", "restore.height=128", "refine.crop=64", "refine.steps=200", "refine.evaluate_every=200",
-        "lift.share=1.0")
-GROWING = ("refine.densify_start=25", "refine.densify_every=25", "refine.densify_stop=151", "refine.spare=0.2")
-AUTOMATIC = ("explore.least=0.005", "lift.share=0.5", "refine.steps=400", "refine.evaluate_every=100",
+SIZE = ("input.height=128", "restore.height=128", "lift.share=1.0", "refine.views.size=64", "refine.steps=200",
+        "refine.evaluate_every=200")  # fmt: skip
+GROWING = ("refine.densification=default", "refine.densify.start=25", "refine.densify.every=25",
+           "refine.densify.stop=151", "refine.spare=0.2")  # fmt: skip
+AUTOMATIC = ("explore.min_revealed=0.005", "lift.share=0.5", "refine.steps=400", "refine.evaluate_every=100",
              "refine.plateau=0.1", "refine.patience=1")  # fmt: skip
 
 
 def tables() -> dict[str, dict[str, tuple[str, ...]]]:
     """Rows by table: name -> the recipe's keys that it changes. The first row is the one that others are held to."""
-    local = ("explore.reach=0.5", "explore.step=0.25")
-    weights = {f"guesses weigh {w}": (f"refine.restored_weight={w}",) for w in (1.0, 0.5, 0.25)}
+    local = ("explore.max_length=0.5", "explore.step=0.25")
+    weights = {f"guesses weigh {w}": (f"refine.loss.restored={w}",) for w in (1.0, 0.5, 0.25)}
     grid = itertools.product((0.25, 0.5, 1.0), (2, 4, 8), (0, 400))
     return {
         "exploration": {
@@ -61,10 +59,7 @@ def tables() -> dict[str, dict[str, tuple[str, ...]]]:
         },
         "weights": weights
         | {
-            "what was seen refined too": ("refine.keep_observed=false",),
-            "a tint for each path": ("refine.colour_rate=1e-3",),
-            "whole panoramas": ("refine.panoramic=true",),
-            "distances of the input": ("refine.distance_weight=0.1",),
+            "what was seen refined too": ("refine.freeze_observed=false",),
             "harmonics of degree 1": ("refine.sh_degree=1", "refine.sh_degree_every=1"),
         },
         "parsimony": {
@@ -72,9 +67,6 @@ def tables() -> dict[str, dict[str, tuple[str, ...]]]:
             "share 0.5": ("lift.share=0.5",),
             "share 0.25": ("lift.share=0.25",),
             "share 0.15": ("lift.share=0.15",),
-            "duplicates merged once": ("refine.duplicates=1",),
-            "duplicates merged three times": ("refine.duplicates=3",),
-            "share 0.5, duplicates merged twice": ("lift.share=0.5", "refine.duplicates=2"),
         },
         "steps": {f"{steps} steps": (f"refine.steps={steps}",) for steps in (0, 50, 150, 400, 1000, 2000)},
         "seeds": {
@@ -106,23 +98,20 @@ class Bench:
             self.made[key] = (result, perf_counter() - started)
         return self.made[key]
 
-    def fused(self, config: ReconstructConfig) -> tuple[list[Restored], float]:
+    def fused(self, config: ReconstructConfig) -> tuple[list[Explored], float]:
         """The state after each path, and the seconds of all stages so far."""
         room = Room(self.folder, config)
         panorama, _ = self.once(config.input.height, lambda: room.panorama)
         coarse, lifting = self.once(config.lift, lambda: lift_scene(panorama, config.lift))
         paths, _ = self.once(config.explore, lambda: radial_trajectories(panorama, config=config.explore))
         background, knowing = self.once("background", lambda: room_background(panorama, config.restore))
-        network = read_network(config.restore)
-        states, seconds = [], lifting + knowing
+        restore = restorer(config.restore, background, read_network(config.restore))
+        known, states, seconds = Survey(panorama, coarse, paths), [], lifting + knowing
         for index in range(config.explore.trajectories):
-
-            def restore_next(index=index, last=states[-1] if states else None):
-                arguments = (coarse, panorama, paths, index, last, jax.random.key(config.seed))
-                return restore_trajectory(*arguments, stages=config, background=background, network=network)
-
+            start = states[-1] if states else None
+            following = explore_and_restore(known, restore, jax.random.key(config.seed), stages=config, start=start)
             key = (config.lift, config.explore, config.restore, config.seed, index)
-            state, spent = self.once(key, restore_next)
+            state, spent = self.once(key, lambda following=following: next(following))
             states, seconds = [*states, state], seconds + spent
         return states, seconds
 
@@ -133,8 +122,8 @@ class Bench:
         started = perf_counter()
         views = collect_views(panorama, [state.video for state in states], stages=config)
         key = jax.random.key(config.seed + 1)
-        scene, _ = refine_scene(states[-1].scene, views, panorama, key, stages=config)
-        return jax.block_until_ready(scene), seconds + perf_counter() - started
+        (last,) = deque(refine_scene(states[-1].scene, views, panorama, key, stages=config), maxlen=1)
+        return jax.block_until_ready(last.scene), seconds + perf_counter() - started
 
     def row(self, config: ReconstructConfig) -> dict:
         """PSNR meaned over the novel views, Gaussians, seconds, paths that were restored, and a digest of the scene."""

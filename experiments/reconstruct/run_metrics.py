@@ -24,7 +24,7 @@ def choices(result: Reconstruction, store: StageStore, explore: ExploreConfig) -
     """What each path revealed and cost, why exploring and refining ended, and what each held-out evaluation found."""
     seconds = {stage.name: round(stage.seconds, 3) for stage in store.finished}
     paths = [
-        {"revealed": share, "restored": share >= explore.least, "seconds": seconds[f"restore-{index:02d}"]}
+        {"revealed": share, "restored": share >= explore.min_revealed, "seconds": seconds[f"restore-{index:02d}"]}
         for index, share in enumerate(result.decisions.revealed)
     ]
     found = [{"step": int(step), "held_out_psnr": round(float(psnr), 3)} for step, psnr in result.curves.psnr]

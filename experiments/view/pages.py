@@ -1,4 +1,4 @@
-"""What `view` serves of a run: the walk through its scenes when it is done, and how far it is while it runs."""
+"""Pages that `view` serves of a run: the viewer over its scenes when it is done, its progress while it runs."""
 
 from collections.abc import Callable
 from functools import partial
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.reconstruct.story import plan
+from experiments.reconstruct.run_report import room_plan
 from experiments.run_folder import RunFolder, open_run
 from experiments.view.server import Pages
 from rein3d_jax.errors import InputError
@@ -18,30 +18,30 @@ from rein3d_jax.report.chart import Chart, Series, line_chart
 from rein3d_jax.report.style import STYLE
 from rein3d_jax.report.viewer import render_viewer
 
-FILES = {"report.html": "text/html", "flythrough.mp4": "video/mp4", "scene.ply": "application/octet-stream"}
-SPZ = "application/octet-stream"
-REFRESH = 5  # seconds
-CURVES = {"loss": ("Loss", "loss"), "psnr": ("PSNR of held-out views", "dB"), "count": ("Gaussians", "count")}
+_FILES = {"report.html": "text/html", "flythrough.mp4": "video/mp4", "scene.ply": "application/octet-stream"}
+_SPZ = "application/octet-stream"
+_REFRESH = 5  # seconds
+_CURVES = {"loss": ("Loss", "loss"), "psnr": ("PSNR of held-out views", "dB"), "count": ("Gaussians", "count")}
 
 
 def pages(run: RunFolder) -> Pages:
-    """Every path that is served."""
+    """Every path that is served, with its media type and what makes its content."""
     return {
         "/": ("text/html", lambda: _front(run.path)),
-        "/walk": ("text/html", lambda: _walk(open_run(run.path))),
-        "/coarse.spz": (SPZ, _kept(run.path, "stages/lift.npz", lambda fresh: fresh.coarse)),
-        "/sofar.spz": (SPZ, _kept(run.path, "stages/unfinished.npz", lambda fresh: fresh.unfinished)),
-        "/refined.spz": (SPZ, _kept(run.path, "scene.ply", lambda fresh: fresh.refined)),
-        **{f"/{name}": (media, partial(_file, run.path / name)) for name, media in FILES.items()},
+        "/viewer": ("text/html", lambda: _viewer(open_run(run.path))),
+        "/coarse.spz": (_SPZ, _encoded(run.path, "stages/lift.npz", lambda fresh: fresh.coarse)),
+        "/sofar.spz": (_SPZ, _encoded(run.path, "stages/unfinished.npz", lambda fresh: fresh.unfinished)),
+        "/refined.spz": (_SPZ, _encoded(run.path, "scene.ply", lambda fresh: fresh.refined)),
+        **{f"/{name}": (media, partial(_file, run.path / name)) for name, media in _FILES.items()},
     }
 
 
 def _front(path: Path) -> bytes:
     run = open_run(path)
-    return _walk(run) if run.finished else _progress(run)
+    return _viewer(run) if run.finished else _progress(run)
 
 
-def _walk(run: RunFolder) -> bytes:
+def _viewer(run: RunFolder) -> bytes:
     """The viewer over what there is: the refined scene, or else what refining has reached. Raises InputError before the
     scene was lifted and explored."""
     scenes = {"Coarse": "/coarse.spz"}
@@ -50,13 +50,13 @@ def _walk(run: RunFolder) -> bytes:
     elif (run.path / "stages" / "unfinished.npz").exists():
         scenes["So far"] = "/sofar.spz"
     page = render_viewer(
-        scenes, encode_jpeg(np.asarray(run.panorama.rgb)), plan(run.trajectories, run.config.explore, []),
+        scenes, encode_jpeg(np.asarray(run.panorama.rgb)), room_plan(run.trajectories, run.config.explore, []),
         backdrop=np.asarray(run.backdrop), filter_variance=run.config.rasterize.filter_variance,
     )  # fmt: skip
     return page.encode()
 
 
-def _kept(path: Path, file: str, scene: Callable) -> Callable[[], bytes]:
+def _encoded(path: Path, file: str, scene: Callable) -> Callable[[], bytes]:
     """The scene as SPZ, encoded again only when its file has changed."""
     last: dict[int, bytes] = {}
 
@@ -81,12 +81,12 @@ def _progress(run: RunFolder) -> bytes:
     rows = "".join(f"<tr><td>{escape(name)}</td><td>{escape(state)}</td></tr>" for name, state in run.progress())
     charts = "".join(f"<figure><h2>{title}</h2>{line_chart(chart)}</figure>" for title, chart in _charts(run))
     explored = (run.path / "stages" / "explore.npz").exists()
-    walk = '<p><a href="/walk">Walk through what is there so far</a></p>' if explored else ""
+    viewer = '<p><a href="/viewer">The scene so far</a></p>' if explored else ""
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>Working</title>'
-        f'<meta http-equiv="refresh" content="{REFRESH}"><link rel="icon" href="data:,"><style>{STYLE}</style></head>'
-        f"<body><main><h1>Your room is being made</h1><p>{escape(str(run.path))}; this page looks again every "
-        f"{REFRESH} seconds.</p>{walk}<table><thead><tr><th>Stage</th><th>State</th></tr></thead>"
+        f'<meta http-equiv="refresh" content="{_REFRESH}"><link rel="icon" href="data:,"><style>{STYLE}</style></head>'
+        f"<body><main><h1>Your room is being made</h1><p>{escape(str(run.path))}; this page asks again every "
+        f"{_REFRESH} seconds.</p>{viewer}<table><thead><tr><th>Stage</th><th>State</th></tr></thead>"
         f"<tbody>{rows}</tbody></table>"
         f'<div class="row wide">{charts}</div></main></body></html>\n'
     ).encode()
@@ -94,9 +94,9 @@ def _progress(run: RunFolder) -> bytes:
 
 def _charts(run: RunFolder):
     try:
-        curves = run.curves(CURVES)
-    except InputError:  # refinement has not looked yet
+        curves = run.curves(_CURVES)
+    except InputError:  # no held-out evaluation yet
         return
     for name, points in curves.items():
-        title, unit = CURVES[name]
+        title, unit = _CURVES[name]
         yield title, Chart(title, "step", unit, (Series(unit, points[:, 0], points[:, 1]),))

@@ -26,12 +26,14 @@ height = 64
 [refine]
 steps = 4
 batch = 1
-crop = 32
 sh_degree = 0
 evaluate_every = 2
-densify_start = 2
-densify_every = 2
-densify_stop = 4
+[refine.views]
+size = 32
+[refine.densify]
+start = 2
+every = 2
+stop = 4
 [film]
 width = 64
 height = 48
@@ -127,15 +129,15 @@ def turned_pose():
 @pytest.fixture(scope="session")
 def run_folder(rooms, tmp_path_factory):
     """A run's folder, written from the room's truth: its restored videos are exact, its scene is the lifted input."""
-    from rein3d_jax.pipeline.pipeline import Restored, lift_scene
-
     from experiments.config import config_from, dump_config
-    from experiments.reconstruct.__main__ import ReconstructConfig
-    from experiments.reconstruct.inputs import read_panorama
+    from experiments.reconstruct.config import ReconstructConfig
+    from experiments.reconstruct.inputs import input_panorama
     from rein3d_jax.explore.trajectories import radial_trajectories
     from rein3d_jax.geometry.sphere import rays_of_pose as rays_at
     from rein3d_jax.io.files.checkpoint import save
     from rein3d_jax.io.splats.ply import write_ply
+    from rein3d_jax.pipeline.explore_and_restore import Explored
+    from rein3d_jax.pipeline.survey import lift_scene, with_distance
     from rein3d_jax.scene import Video
 
     folder, room = tmp_path_factory.mktemp("run") / "room", rooms / "room2"
@@ -147,7 +149,7 @@ def run_folder(rooms, tmp_path_factory):
         key = np.zeros(32, np.uint8)
         save(folder / "stages" / f"{name}.npz", {"key": key, "result": result, "seconds": np.float64(1)})
 
-    panorama, _ = read_panorama(config.input, config.depth, config.shell)
+    panorama, _ = with_distance(input_panorama(config.input), config)
     coarse, paths = lift_scene(panorama, config.lift), radial_trajectories(panorama, config=config.explore)
     stage("read", (panorama, np.array([False])))
     stage("lift", coarse)
@@ -158,7 +160,7 @@ def run_folder(rooms, tmp_path_factory):
         rgb, distance = (np.float32(part) for part in zip(*truth, strict=True))
         video = Video(rgb, np.ones_like(distance), distance, poses)
         shared, nothing, buffers = np.zeros((), np.float32), np.zeros((), np.int32), np.zeros(4, np.int32)
-        stage(f"restore-{index:02d}", Restored(coarse, video, shared, nothing, buffers))
+        stage(f"restore-{index:02d}", Explored(coarse, video, np.int32(index + 1), shared, nothing, buffers))
     write_ply(folder / "scene.ply", coarse)
     (folder / "config.toml").write_text(dump_config(config))
     return folder

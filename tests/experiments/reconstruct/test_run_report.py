@@ -2,7 +2,6 @@
 
 import dataclasses
 import re
-from pathlib import Path
 
 import cv2
 import html5lib
@@ -10,55 +9,63 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-from experiments.reconstruct import story
-from experiments.reconstruct.inputs import FITTED, GIVEN, SAMPLES, InputConfig
+from experiments.reconstruct.inputs import SAMPLES, InputConfig
+from experiments.reconstruct.run import Pictures, Run
+from experiments.reconstruct.run_report import longest, run_report
 from experiments.reconstruct.sources import sources
 from experiments.run_folder import open_run
 from rein3d_jax.geometry.poses import pinhole_camera, upright
 from rein3d_jax.io.rooms.traced_room import View
+from rein3d_jax.pipeline.reconstruct import ALL_PATHS, Decisions, Reconstruction
+from rein3d_jax.refine import Curves
+from rein3d_jax.refine.refine import ALL_STEPS
 from rein3d_jax.report.report import Comparison, render_report
 
 HOSTILE = "<script>alert(1)</script> \"quoted\" & 'single'"
 FILE = "<img src=x onerror=alert(1)> & 'quoted'.png"  # no slash, which a file's name cannot have
-ROOT = Path(__file__).resolve().parents[3]
+PICTURE = np.full((32, 32, 3), 0.5, np.float32)
+
+
+METRICS = {
+    "seconds": {"read": 1.0, "lift": 2.0, "refine": 30.0, "write": 9.0, "total": 42.0},
+    "count": {"pixels": 8192, "lift": 8192, "refined": 9000},
+    "overflows": {"explore.max_frames": 0, "lift.capacity": 0, "refine.spare": 0},
+    "skipped_steps": 0,
+    "coverage": {"coarse": 0.95, "refined": 1.0},
+    "quality": {name: {"psnr": 20.0, "ssim": 0.7, "views": 1} for name in ("coarse", "refined")},
+}
 
 
 @pytest.fixture(scope="module")
 def run(run_folder):
     """A run with one novel view, whose names a hostile file could have."""
     found = open_run(run_folder)
-    videos = list(found.videos())
-    ends = [np.asarray(videos[index].rgb[-1]) for index in story.longest(found.trajectories)]
-    picture = np.full((32, 32, 3), 0.5, np.float32)
-    view = View(HOSTILE, picture, pinhole_camera(upright(np.array([0.5, 0, 0])), 32, 1.5))
-    metrics = {
-        "seconds": {"read": 1.0, "lift": 2.0, "refine": 30.0, "write": 9.0, "total": 42.0},
-        "count": {"pixels": 8192, "lift": 8192, "refined": 9000},
-        "overflows": {"explore.max_frames": 0, "lift.capacity": 0, "refine.spare": 0},
-        "skipped_steps": 0,
-        "coverage": {"coarse": 0.95, "refined": 1.0},
-        "quality": {name: {"psnr": 20.0, "ssim": 0.7, "views": 1} for name in ("coarse", "refined")},
-    }
-    curves = {name: np.zeros((0, 2)) for name in ("loss", "psnr", "count")}
-    config = InputConfig(panorama=f"somewhere/{FILE}", distance=None, views=None)
-    return story.Run(config, found.config.explore, found.panorama, GIVEN, found.trajectories, videos, ends, ends,
-                     [view], [picture], [picture], curves, metrics)  # fmt: skip
+    named = InputConfig(panorama=f"somewhere/{FILE}", distance=None, views=None)
+    curves = Curves(*[np.zeros((0, 2))] * 3, *[np.zeros(())] * 3)
+    decisions = Decisions((0.1, 0.1), ALL_PATHS, ALL_STEPS, 0)
+    scenes = (found.coarse, found.trajectories, tuple(found.videos()), found.refined)
+    result = Reconstruction(found.panorama, *scenes, curves, decisions)
+    view = View(HOSTILE, PICTURE, pinhole_camera(upright(np.array([0.5, 0, 0])), 32, 1.5))
+    return Run(dataclasses.replace(found.config, input=named), result, False, [view])
 
 
-def with_metrics(run, **changes):
-    return dataclasses.replace(run, metrics={**run.metrics, **changes})
+def report(run, **changes):
+    """The run's report, some of its metrics changed."""
+    paths = longest(run.result.trajectories)
+    ends = [np.asarray(run.result.videos[index].rgb[-1]) for index in paths]
+    return run_report(run, Pictures(ends, ends, [PICTURE], [PICTURE]), {**METRICS, **changes})
 
 
 def test_every_shown_path_and_view_has_a_slider(run):
-    parts = [part for part in story.tell(run).parts if isinstance(part, Comparison)]
-    assert len(parts) == len(story.longest(run.trajectories)) + 1
+    parts = [part for part in report(run).parts if isinstance(part, Comparison)]
+    assert len(parts) == len(longest(run.result.trajectories)) + 1
     for part in parts:  # a divider needs two pictures of a size
         sizes = {cv2.imdecode(np.frombuffer(p.data, np.uint8), 1).shape for p in (part.before, part.after)}
         assert len(sizes) == 1
 
 
 def test_the_page_is_valid_and_names_are_text(run):
-    page = render_report(story.tell(run))
+    page = render_report(report(run))
     html5lib.HTMLParser(strict=True).parse(page)
     assert "<script" not in page and "<img src=x" not in page
     assert "&lt;script&gt;" in page and "&lt;img src=x" in page  # the view's name, and the picture's
@@ -75,23 +82,24 @@ def test_the_page_is_valid_and_names_are_text(run):
     ],
 )
 def test_warnings_in_plain_words(run, changes, words):
-    assert not story.tell(run).warnings
-    (warning,) = story.tell(with_metrics(run, **changes)).warnings
+    assert not report(run).warnings
+    (warning,) = report(run, **changes).warnings
     assert re.search(words, warning)
 
 
 def test_a_guessed_scale_is_told(run):
-    report = story.tell(dataclasses.replace(run, origin_of_distance=FITTED))
-    assert any("scale is a guess" in warning and "shell.camera_height" in warning for warning in report.warnings)
-    assert "room-shell estimate" in report.distance_origin
+    found = report(dataclasses.replace(run, fitted=True))
+    assert any("scale is a guess" in warning and "shell.camera_height" in warning for warning in found.warnings)
+    assert "room-shell estimate" in found.distance_origin
 
 
 def test_a_run_stands_among_what_was_measured(run):
-    (own,) = [mark for mark in story.tell(run).standing.marks if mark.own]
+    (own,) = [mark for mark in report(run).standing.marks if mark.own]
     assert (own.cost, own.merit) == (33.0, 20.0)  # from the panorama to the scene, nothing of what is written after
-    blind = with_metrics(run)
-    del blind.metrics["quality"]
-    (own,) = [mark for mark in story.tell(blind).standing.marks if mark.own]
+    paths, blind = longest(run.result.trajectories), {k: v for k, v in METRICS.items() if k != "quality"}
+    ends = [np.asarray(run.result.videos[index].rgb[-1]) for index in paths]
+    found = run_report(run, Pictures(ends, ends, [PICTURE], [PICTURE]), blind)
+    (own,) = [mark for mark in found.standing.marks if mark.own]
     assert own.merit is None and "no truth" in own.label
 
 
