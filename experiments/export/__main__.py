@@ -19,7 +19,7 @@ from experiments.export.scene_panoramas import write_panoramas
 from experiments.run_folder import RunFolder, open_run
 from rein3d_jax.io.exports.colmap import write_colmap
 from rein3d_jax.io.exports.nerfstudio import write_nerfstudio
-from rein3d_jax.io.exports.point_cloud import points_of
+from rein3d_jax.io.exports.point_cloud import thinned_points
 from rein3d_jax.io.meshes.surface_mesh import write_glb
 from rein3d_jax.io.splats.gaussian_file import write_splats
 
@@ -49,12 +49,12 @@ def _export(options: argparse.Namespace) -> None:
 
 
 def _nerfstudio(run: RunFolder, output: Path, options) -> str:
-    count = write_nerfstudio(output / "nerfstudio", posed_pictures(run), points_of(run.refined, _POINTS))
+    count = write_nerfstudio(output / "nerfstudio", posed_pictures(run), thinned_points(run.refined, _POINTS))
     return f"{output / 'nerfstudio'}: {count} pictures"
 
 
 def _colmap(run: RunFolder, output: Path, options) -> str:
-    count = write_colmap(output / "colmap", posed_pictures(run), points_of(run.refined, _POINTS))
+    count = write_colmap(output / "colmap", posed_pictures(run), thinned_points(run.refined, _POINTS))
     return f"{output / 'colmap'}: {count} pictures"
 
 

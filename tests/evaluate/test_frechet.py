@@ -39,9 +39,9 @@ def test_it_is_a_distance_that_no_rotation_changes():
     (m1, c1), (m2, c2) = gaussian(2), gaussian(3)
     value = frechet_distance(m1, c1, m2, c2)
     np.testing.assert_allclose(frechet_distance(m2, c2, m1, c1), value, rtol=1e-9)
-    turn = ortho_group.rvs(6, random_state=0)
-    turned = frechet_distance(turn @ m1, turn @ c1 @ turn.T, turn @ m2, turn @ c2 @ turn.T)
-    np.testing.assert_allclose(turned, value, rtol=1e-9)
+    rotation = ortho_group.rvs(6, random_state=0)
+    rotated = frechet_distance(rotation @ m1, rotation @ c1 @ rotation.T, rotation @ m2, rotation @ c2 @ rotation.T)
+    np.testing.assert_allclose(rotated, value, rtol=1e-9)
     assert frechet_distance(m1, c1, m1, c1) < 1e-12
 
 

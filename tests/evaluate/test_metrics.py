@@ -74,8 +74,8 @@ def test_yawing_both_panoramas_changes_nothing():
     image = rng.uniform(size=(128, 256, 3)).astype(np.float32)
     noisy = np.clip(image + rng.normal(0, 0.1, image.shape), 0, 1).astype(np.float32)
     for metric in (ws_psnr, ws_ssim):
-        turned = metric(np.roll(noisy, 100, axis=1), np.roll(image, 100, axis=1))
-        np.testing.assert_allclose(turned, metric(noisy, image), atol=1e-4)  # the same sums in another order
+        yawed = metric(np.roll(noisy, 100, axis=1), np.roll(image, 100, axis=1))
+        np.testing.assert_allclose(yawed, metric(noisy, image), atol=1e-4)  # the same sums in another order
 
 
 def test_rows_weigh_by_their_area():

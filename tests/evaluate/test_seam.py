@@ -15,11 +15,11 @@ def waves():
     return np.stack([0.5 + 0.4 * rows * np.sin(k * azimuth + k) for k in (1, 2, 3)], axis=-1).astype(np.float32)
 
 
-def test_a_picture_that_goes_round_has_no_seam_however_it_is_turned():
-    for turn in range(0, WIDTH, 9):
+def test_a_picture_that_goes_round_has_no_seam_at_any_yaw():
+    for shift in range(0, WIDTH, 9):
         # The jump changes from column to column by the wave's curvature: 255 * 0.4 * (3 * 2 pi / 128)^2 = 2.2 levels.
         # Where the slope changes sign, that much of the mean of three remains at most.
-        assert abs(seam_error(np.roll(waves(), turn, axis=1))) < 2.2 / 2
+        assert abs(seam_error(np.roll(waves(), shift, axis=1))) < 2.2 / 2
 
 
 def test_a_flat_picture_has_no_seam():

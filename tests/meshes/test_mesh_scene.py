@@ -86,8 +86,8 @@ def test_marks_appear_where_the_frame_says(tmp_path):
         assert rgb[row, column].argmax() == channel and rgb[row, column].min() < 0.05, (row, column)
         assert away <= distance[row, column] < away + 0.02  # half a pixel off the axis
     assert np.ptp(rgb[16, 48]) < 1e-3  # nothing on the right
-    turned = scene.at(EYE).trace(np.asarray(upright(np.zeros(3), np.pi / 2), np.float64), 32)[0]
-    np.testing.assert_allclose(turned, np.roll(rgb, 16, axis=1), atol=0.02)  # edges meet other samples
+    yawed = scene.at(EYE).trace(np.asarray(upright(np.zeros(3), np.pi / 2), np.float64), 32)[0]
+    np.testing.assert_allclose(yawed, np.roll(rgb, 16, axis=1), atol=0.02)  # edges meet other samples
 
 
 def test_light_is_what_the_module_says(tmp_path):

@@ -18,11 +18,11 @@ def tracer():
     """trace, compiled once for each height and number of samples: always for two frames, the last given one again."""
     compiled = jax.jit(trace, static_argnums=2, static_argnames="samples")
 
-    def look(room, poses, height, *, samples=1):
+    def traced(room, poses, height, *, samples=1):
         assert len(poses) <= 2
         return compiled(room, jnp.concatenate([poses, poses[-1:]])[:2], height, samples=samples)
 
-    return look
+    return traced
 
 
 @pytest.fixture(scope="session")
@@ -40,12 +40,12 @@ def room_of(many_rooms):
 
 @pytest.fixture(scope="session")
 def pose_at():
-    """world_from_camera of an upright panorama at (x, y, z) metres, turned RIGHT by radians."""
+    """world_from_camera of an upright panorama at (x, y, z) metres, yawed RIGHT by radians."""
 
     def pose(x=0.0, y=0.0, z=0.0, right=0.0):
         c, s = jnp.cos(right), jnp.sin(right)
-        turn = jnp.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        rotation = jnp.matmul(turn, world_from_camera_axes(), precision="highest")
+        yaw = jnp.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        rotation = jnp.matmul(yaw, world_from_camera_axes(), precision="highest")
         return rigid(rotation, jnp.array([x, y, z], jnp.float32))
 
     return pose

@@ -1,4 +1,4 @@
-"""Laws of the traced picture: turning, shadows, filtering, platforms."""
+"""Laws of the traced picture: yaw, shadows, filtering, platforms."""
 
 import jax
 import jax.export
@@ -16,14 +16,14 @@ def psnr(a, b):
     return -10 * np.log10(np.mean((np.asarray(a) - np.asarray(b)) ** 2))
 
 
-def test_turning_by_whole_pixels_rolls_the_panorama(room_of, tracer, pose_at):
+def test_yawing_by_whole_pixels_rolls_the_panorama(room_of, tracer, pose_at):
     columns = 17
-    turned = pose_at(0.1, 0.0, 0.0, right=columns * np.pi / HEIGHT)
-    view = tracer(room_of(2), jnp.stack([pose_at(0.1, 0.0, 0.0), turned]), HEIGHT)
+    yawed = pose_at(0.1, 0.0, 0.0, right=columns * np.pi / HEIGHT)
+    view = tracer(room_of(2), jnp.stack([pose_at(0.1, 0.0, 0.0), yawed]), HEIGHT)
     for name, atol in (("rgb", 1 / 255), ("distance", 1e-4), ("object", 0)):
         first, second = (np.asarray(getattr(view, name)[i]) for i in (0, 1))
         off = np.abs(np.roll(first, -columns, axis=1) - second) > atol
-        # Rays turned by float32 sines may fall on the other side of an edge or of a texture's cell.
+        # Rays rotated by float32 sines may fall on the other side of an edge or of a texture's cell.
         assert off.mean() < 5e-3, name
 
 

@@ -21,7 +21,7 @@ class Points:
     colours: np.ndarray  # (n, 3) uint8 sRGB
 
 
-def points_of(gaussians: Gaussians, limit: int) -> Points:
+def thinned_points(gaussians: Gaussians, limit: int) -> Points:
     """The centres of the scene's splats that cover more than half of what is behind them, evenly thinned to at most
     `limit`; their colours without what depends on the view."""
     chosen = np.flatnonzero(np.asarray(gaussians.alive) & (np.asarray(gaussians.opacity_logits) > 0))

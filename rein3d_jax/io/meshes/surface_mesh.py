@@ -23,7 +23,7 @@ class Surface:
     colours: np.ndarray  # (v, 3) sRGB
 
 
-def surface(
+def extract_surface(
     signed: np.ndarray, known: np.ndarray, rgb: np.ndarray, low: np.ndarray, voxel: float, *, jump: float = np.inf
 ) -> Surface:
     """Surface where `signed` (x, y, z) metres passes 0 between samples that are all `known` and differ by less than
@@ -45,25 +45,25 @@ def surface(
     return Surface(np.asarray(low) + vertices * voxel, faces, np.asarray(rgb)[tuple(nearest.T)])
 
 
-def without_islands(found: Surface, area: float) -> Surface:
+def without_islands(surface: Surface, area: float) -> Surface:
     """The parts that hang together over `area` square metres or more. Raises InputError without trimesh, or where
     nothing is left."""
     trimesh = _trimesh()
-    mesh = trimesh.Trimesh(found.vertices, found.faces, process=False)
-    groups = trimesh.graph.connected_components(mesh.face_adjacency, nodes=np.arange(len(found.faces)))
+    mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
+    groups = trimesh.graph.connected_components(mesh.face_adjacency, nodes=np.arange(len(surface.faces)))
     large = [group for group in groups if mesh.area_faces[group].sum() >= area]
     if not large:
         raise InputError(f"no part of the mesh has {area} square metres: lower --island")
-    faces = found.faces[np.sort(np.concatenate(large))]
+    faces = surface.faces[np.sort(np.concatenate(large))]
     used, numbered = np.unique(faces, return_inverse=True)
-    return Surface(found.vertices[used], numbered.reshape(faces.shape), found.colours[used])
+    return Surface(surface.vertices[used], numbered.reshape(faces.shape), surface.colours[used])
 
 
-def write_glb(path: Path, found: Surface) -> None:
+def write_glb(path: Path, surface: Surface) -> None:
     """Writes the mesh, Y up as glTF wants and with linear colours, atomically. Raises InputError."""
-    mesh = _trimesh().Trimesh(found.vertices @ _Y_UP_FROM_Z_UP.T, found.faces, process=False)
-    opaque = np.full((len(found.colours), 1), 255, np.uint8)
-    mesh.visual.vertex_colors = np.hstack([to_uint8(linear_from_srgb(np.clip(found.colours, 0, 1))), opaque])
+    mesh = _trimesh().Trimesh(surface.vertices @ _Y_UP_FROM_Z_UP.T, surface.faces, process=False)
+    opaque = np.full((len(surface.colours), 1), 255, np.uint8)
+    mesh.visual.vertex_colors = np.hstack([to_uint8(linear_from_srgb(np.clip(surface.colours, 0, 1))), opaque])
     write_bytes(path, mesh.export(file_type="glb"))
 
 

@@ -15,7 +15,7 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.poses import upright
 from rein3d_jax.geometry.signed_distance import blank_field, fuse
 from rein3d_jax.geometry.sphere import rays_of_pose64
-from rein3d_jax.io.meshes.surface_mesh import surface, without_islands, write_glb
+from rein3d_jax.io.meshes.surface_mesh import extract_surface, without_islands, write_glb
 from rein3d_jax.io.pictures.distance import read_distance
 from rein3d_jax.io.pictures.image import read_rgb
 from rein3d_jax.io.splats.gaussian_file import read_splats
@@ -135,5 +135,5 @@ def test_faults_are_one_line(run_folder, tmp_path, capsys, monkeypatch):
     (tmp_path / "file").write_text("")
     refused(capsys, [str(run_folder), "--to", "spz", "--output", str(tmp_path / "file")], "cannot be written")
     monkeypatch.setitem(sys.modules, "skimage.measure", None)
-    monkeypatch.setattr(export, "scene_mesh", lambda *_: surface(*[np.zeros((2, 2, 2))] * 3, np.zeros(3), 1.0))
+    monkeypatch.setattr(export, "scene_mesh", lambda *_: extract_surface(*[np.zeros((2, 2, 2))] * 3, np.zeros(3), 1.0))
     refused(capsys, [str(run_folder), "--to", "mesh"], "pip install 'rein3d-jax[export]'")

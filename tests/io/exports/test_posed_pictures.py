@@ -12,12 +12,12 @@ from rein3d_jax.geometry.pinhole import pixels_from_points
 from rein3d_jax.geometry.poses import invert, pinhole_camera, upright
 from rein3d_jax.io.exports.colmap import quaternion, write_colmap
 from rein3d_jax.io.exports.nerfstudio import write_nerfstudio
-from rein3d_jax.io.exports.point_cloud import Points, points_of
+from rein3d_jax.io.exports.point_cloud import Points, thinned_points
 from rein3d_jax.io.exports.posed_picture import PosedPicture
 from rein3d_jax.scene import Gaussians
 
 SIZE = 32
-TURNS = [(0.0, 0.0), (0.7, 0.3), (2.5, -1.2), (-1.5, np.pi / 2)]  # yaw, pitch
+YAW_PITCH = [(0.0, 0.0), (0.7, 0.3), (2.5, -1.2), (-1.5, np.pi / 2)]  # yaw, pitch
 EYES = np.array([[0, 0, 0], [0.3, -0.2, 0.1], [1, 2, -0.5], [0, 0.5, 0]])
 AHEAD = np.array([[0.1, -0.3, 1.0], [-0.6, 0.5, 1.4], [0.0, 0.0, 2.0]])  # metres in camera axes
 ATOL = 1e-3  # pixels: poses are float32, and images.txt holds pixels to a thousandth
@@ -26,7 +26,7 @@ ATOL = 1e-3  # pixels: poses are float32, and images.txt holds pixels to a thous
 @pytest.fixture(scope="module")
 def pictures():
     rng = np.random.default_rng(0)
-    cameras = [pinhole_camera(upright(eye, *turn), SIZE, 1.4) for eye, turn in zip(EYES, TURNS, strict=True)]
+    cameras = [pinhole_camera(upright(eye, *angles), SIZE, 1.4) for eye, angles in zip(EYES, YAW_PITCH, strict=True)]
     return [
         PosedPicture(f"p{i}", rng.random((SIZE, SIZE, 3)), rng.random((SIZE, SIZE)) > 0.3,
                      np.full((SIZE, SIZE), 2.0), camera)
@@ -97,8 +97,8 @@ def test_colmap_model_read_by_hand(pictures, points, tmp_path):
         w, x, y, z, *shift = map(float, pose)
         world, pixels = ours(picture)
         axis = np.array([x, y, z])  # Rodrigues: p + 2 w (a x p) + 2 a x (a x p)
-        turned = world + 2 * w * np.cross(axis, world) + 2 * np.cross(axis, np.cross(axis, world))
-        local = turned + shift
+        rotated = world + 2 * w * np.cross(axis, world) + 2 * np.cross(axis, np.cross(axis, world))
+        local = rotated + shift
         seen = np.stack([cx + fx * local[:, 0] / local[:, 2], cy + fy * local[:, 1] / local[:, 2]], axis=-1)
         np.testing.assert_allclose(seen, pixels, atol=ATOL)
         check_files(tmp_path, f"images/{name}", f"masks/{name}.png", picture)
@@ -121,7 +121,7 @@ def test_colmap_model_read_by_pycolmap(pictures, points, tmp_path):
     assert all((p.color == points.colours[i - 1]).all() for i, p in model.points3D.items())
 
 
-def test_quaternions_turn_as_their_matrices():
+def test_quaternions_rotate_as_their_matrices():
     rng = np.random.default_rng(1)
     for wanted in [*rng.standard_normal((20, 4)), [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1], [0, 0.6, 0.8, 0]]:
         w, *v = wanted / np.linalg.norm(wanted)
@@ -137,10 +137,10 @@ def test_points_are_thinned_from_what_is_solid():
     alive, logits = np.arange(n) % 2 == 0, np.where(np.arange(n) < 50, 3.0, -3.0)
     means = np.arange(3 * n, dtype=np.float32).reshape(n, 3)
     scene = Gaussians(means, means, np.zeros((n, 4)), logits, sh, alive)
-    assert points_of(scene, 1000).places[:, 0].tolist() == [6.0 * i for i in range(25)]
-    few = points_of(scene, 5)
+    assert thinned_points(scene, 1000).places[:, 0].tolist() == [6.0 * i for i in range(25)]
+    few = thinned_points(scene, 5)
     assert len(few.places) == 5 and (few.colours == 255).all()
-    assert len(points_of(scene.replace(alive=np.zeros(n, bool)), 5).places) == 0
+    assert len(thinned_points(scene.replace(alive=np.zeros(n, bool)), 5).places) == 0
 
 
 @pytest.mark.parametrize("write", [write_nerfstudio, write_colmap])

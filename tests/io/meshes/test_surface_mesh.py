@@ -8,7 +8,7 @@ import trimesh
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.meshes.mesh_file import read_mesh
-from rein3d_jax.io.meshes.surface_mesh import Surface, surface, without_islands, write_glb
+from rein3d_jax.io.meshes.surface_mesh import Surface, extract_surface, without_islands, write_glb
 
 BOX = np.array([1.0, 0.8, 0.6])  # half sizes, metres
 LOW, VOXEL, SHAPE = -1.2 * np.ones(3), 0.1, (25, 25, 25)
@@ -19,7 +19,7 @@ RGB = (PLACES + 1.2) / 2.4
 
 
 def boxed(known=None):
-    return surface(INSIDE, np.ones(SHAPE, bool) if known is None else known, RGB, LOW, VOXEL)
+    return extract_surface(INSIDE, np.ones(SHAPE, bool) if known is None else known, RGB, LOW, VOXEL)
 
 
 def mesh_of(found):
@@ -75,7 +75,7 @@ def test_loose_parts_are_dropped():
 def test_no_surface():
     for signed, known in ((np.abs(INSIDE) + 1, True), (INSIDE, False)):
         with pytest.raises(InputError, match="no surface"):
-            surface(signed, np.full(SHAPE, known), RGB, LOW, VOXEL)
+            extract_surface(signed, np.full(SHAPE, known), RGB, LOW, VOXEL)
 
 
 @pytest.mark.parametrize("missing", ["skimage.measure", "trimesh"])

@@ -34,8 +34,8 @@ def quarter_left(position):
 
 def write_room(folder):
     """A box room whose panoramas carry their distance as colour, too."""
-    for name, eye, turn in (("input", (0, 0, 0), np.eye(4)), ("pano", (1, -1, 0), quarter_left((1, -1, 0)))):
-        rays = rays_of_pose64(upright(np.zeros(3)), 16) @ turn[:3, :3].T
+    for name, eye, rotation in (("input", (0, 0, 0), np.eye(4)), ("pano", (1, -1, 0), quarter_left((1, -1, 0)))):
+        rays = rays_of_pose64(upright(np.zeros(3)), 16) @ rotation[:3, :3].T
         distance = box_distance(np.array(eye), rays)
         write_distance_exr(folder / f"{name}_distance.exr", distance)
         write_rgb(folder / f"{name}.png", np.repeat(distance[..., None] / 8, 3, -1))

@@ -20,7 +20,7 @@ import plyfile
 import pytest
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.geometry.spherical_harmonics import basis
+from rein3d_jax.geometry.spherical_harmonics import C0, basis
 from rein3d_jax.io.splats import spz
 from rein3d_jax.io.splats.gaussian_columns import alive_columns
 from rein3d_jax.io.splats.gaussian_file import read_splats, write_splats
@@ -30,7 +30,6 @@ PEER = Path(__file__).parent / "splat_transform"
 SUFFIXES = ["ply", "compressed.ply", "spz", "splat"]
 N = 600  # three chunks of a compressed PLY, the last one part full
 HALF_BYTE = 0.5 / 255
-SH_C0 = 0.28209479177387814
 
 
 def scene(degree=1, dead=(), count=N):
@@ -63,8 +62,8 @@ def alpha(logits):
     return 1 / (1 + np.exp(-logits.astype(np.float64)))
 
 
-def turn_between(a, b):
-    """Radians between two rotations (n, 4), where a splat turned half round one of its own axes is the same."""
+def angle_between(a, b):
+    """Radians between two rotations (n, 4), where a splat 180 degrees about one of its own axes is the same."""
     w, x, y, z = a.T.astype(np.float64)
     same = np.stack([(w, x, y, z), (-x, w, z, -y), (-y, -z, w, x), (-z, y, -x, w)])
     sine = np.sqrt(np.maximum(0, 1 - (same * b.T).sum(axis=1) ** 2)).min(axis=0)
@@ -80,7 +79,7 @@ BOUNDS = {
     # all of 15/128 at the top: 255 stands for 256
     "spz": (0.5 / 4096, 0.5 / 16, 2 * 2 * np.sqrt(3) * 0.5 / 127.5, HALF_BYTE / 0.15, 8 / 128),
     # floats; u8 w x y z in steps of 1/128, where 1 is held as 127/128; colour in [0, 1]
-    "splat": (0, 0, 2 * np.sqrt(4) / 128, HALF_BYTE / SH_C0, None),
+    "splat": (0, 0, 2 * np.sqrt(4) / 128, HALF_BYTE / C0, None),
     # 10 bits of a chunk as wide as the scene (6 m; 8 in log scale; 3.4 in colour coefficients) at most; three of 10
     # bits in [-1, 1] / sqrt(2), the fourth is the largest, >= 1/2; f_rest in steps of 8/256
     "compressed.ply": (3 / 1023, 4 / 1023, 2 * 2 * np.sqrt(3) * np.sqrt(0.5) / 1023, 1.7 / 255, 4 / 256),
@@ -118,10 +117,10 @@ def test_the_antialias_flag_changes_nothing_else(tmp_path, suffix):
 
 def close(got, wanted, bounds):
     a, b = matched(got, wanted)
-    place, scale, turn, colour, rest = bounds
+    place, scale, angle, colour, rest = bounds
     assert np.abs(a.means - b.means).max() <= place + TINY
     assert np.abs(a.log_scales - b.log_scales).max() <= scale + TINY
-    assert turn_between(a.quats, b.quats).max() <= turn + TINY
+    assert angle_between(a.quats, b.quats).max() <= angle + TINY
     assert np.abs(alpha(a.opacity_logits) - alpha(b.opacity_logits)).max() <= HALF_BYTE + TINY
     assert np.abs(a.sh[:, 0] - b.sh[:, 0]).max() <= colour + TINY
     if rest is not None and a.sh.shape == b.sh.shape:
@@ -136,16 +135,14 @@ def test_splat_transform_reads_ours_as_we_do(tmp_path, suffix):
     ours = (tmp_path / f"x.{suffix}").read_bytes(), (PEER / f"ours.{suffix}").read_bytes()
     assert len({gzip.decompress(data) if suffix == "spz" else data for data in ours}) == 1
     theirs = read_splats(PEER / f"ours.{suffix}.read.ply")
-    close(
-        read_splats(PEER / f"ours.{suffix}"), theirs, (0, 0, 0.02, 1e-6, 1e-6)
-    )  # .splat: they centre a byte at 127.5
+    close(read_splats(PEER / f"ours.{suffix}"), theirs, (0, 0, 0.02, 1e-6, 1e-6))  # .splat: they centre a byte at 127.5
     close(theirs, wanted, BOUNDS[suffix])
 
 
 @pytest.mark.parametrize("name", ["theirs.compressed.ply", "theirs.spz"])
 def test_we_read_what_splat_transform_writes(name):
-    place, scale, turn, colour, rest = BOUNDS[name.removeprefix("theirs.")]
-    bounds = (place, scale, turn, colour, rest + 1 / 128)  # it rounds SH to 1/128 first
+    place, scale, angle, colour, rest = BOUNDS[name.removeprefix("theirs.")]
+    bounds = (place, scale, angle, colour, rest + 1 / 128)  # it rounds SH to 1/128 first
     close(read_splats(PEER / name), read_splats(PEER / "scene.ply"), bounds)
 
 
@@ -191,7 +188,7 @@ def test_a_chunk_without_colour_bounds_is_read(tmp_path):
     words = bytearray(body[72:])
     words[12:16] = struct.pack("<I", 255 << 24 | 51 << 8 | 128)  # the first: red 1, green 0, blue 0.2
     (tmp_path / "x.compressed.ply").write_bytes(head + mark + body[:48] + words)
-    rgb = 0.5 + SH_C0 * np.asarray(read_splats(tmp_path / "x.compressed.ply").sh)[0, 0]
+    rgb = 0.5 + C0 * np.asarray(read_splats(tmp_path / "x.compressed.ply").sh)[0, 0]
     np.testing.assert_allclose(rgb, [1, 0, 0.2], atol=1e-6)
 
 
