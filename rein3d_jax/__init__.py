@@ -24,6 +24,7 @@ _DOORS = {
     "InputError": "errors",
     "render": "rasterize",
     "read_panorama": "io.pictures.panorama",
+    "read_network": "networks.trained",
     **dict.fromkeys(("read_splats", "write_splats"), "io.splats.gaussian_file"),
     **dict.fromkeys(("Decisions", "Reconstruction", "reconstruct"), "pipeline.reconstruct"),
     "Stages": "pipeline.stages",

@@ -28,9 +28,10 @@ MAY_IMPORT = {
     "meshes": {"scene", "geometry"},
     "io": {"scene", "geometry", "meshes"},
     "parallel": {"scene"},
+    "networks": {"io", "restore"},
     "pipeline": {"scene", "geometry", "parallel", *STAGES},
     "report": {"scene", "geometry", "evaluate"},
-    "experiments": {"scene", "geometry", "meshes", "io", "parallel", "pipeline", "report", *STAGES},
+    "experiments": {"scene", "geometry", "meshes", "io", "networks", "parallel", "pipeline", "report", *STAGES},
 }
 
 # Outside dependency -> where it may be imported: a folder, or a file. What is not named here has no home.
@@ -42,7 +43,7 @@ HOMES = {
     "optax": ("rein3d_jax/refine/", "experiments/"),
     "jaxopt": ("rein3d_jax/depth/",),
     "cv2": ("rein3d_jax/io/", "rein3d_jax/meshes/", "rein3d_jax/restore/fills.py"),
-    "OpenImageIO": ("rein3d_jax/io/pictures/",),
+    "OpenImageIO": ("rein3d_jax/io/pictures/", "experiments/render_rooms/blender/"),
     "av": ("rein3d_jax/io/pictures/video.py",),
     "orbax": ("rein3d_jax/io/files/",),
     "trimesh": ("rein3d_jax/io/meshes/",),
@@ -54,6 +55,8 @@ HOMES = {
     "ray": ("experiments/build_dataset/ray_workers.py",),
     "tensorboardX": ("rein3d_jax/io/files/training_log.py",),
     "embreex": ("rein3d_jax/meshes/ray_caster.py",),
+    "bpy": ("experiments/render_rooms/blender/",),  # Blender's own Python
+    "mathutils": ("experiments/render_rooms/blender/",),
     "rich": ("experiments/",),
 }
 

@@ -16,7 +16,7 @@ def test_every_name_opens_what_it_names():
 
 
 def test_an_unknown_name_is_said():
-    with pytest.raises(AttributeError, match="rein3d_jax.*recontsruct"):
+    with pytest.raises(AttributeError, match=r"rein3d_jax.*recontsruct"):
         r3d.recontsruct  # noqa: B018
 
 

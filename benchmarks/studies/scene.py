@@ -23,10 +23,10 @@ from experiments.config import load_config
 from experiments.evaluate.room import Room, room_folders
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.quality import is_novel, render_views
-from experiments.restorer_network import read_network
 from rein3d_jax.evaluate.metrics import psnr
 from rein3d_jax.explore.trajectories import radial_trajectories
 from rein3d_jax.io.files.atomic import write_text
+from rein3d_jax.networks.trained import read_network
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
 from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene
 from rein3d_jax.pipeline.survey import Survey, lift_scene, room_background

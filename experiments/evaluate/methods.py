@@ -13,9 +13,9 @@ from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.flythrough import FilmConfig
 from experiments.reconstruct.inputs import InputConfig
 from experiments.reconstruct.job import run_job
-from experiments.restorer_network import read_network
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.splats.ply import read_ply
+from rein3d_jax.networks.trained import read_network
 from rein3d_jax.restore import restorer
 from rein3d_jax.restore.restorer import DIFFUSION, LEARNED, METHODS, Restorer
 from rein3d_jax.scene import Camera, Gaussians

@@ -17,9 +17,9 @@ from experiments.reconstruct.outputs import write_outputs
 from experiments.reconstruct.progress import Progress
 from experiments.reconstruct.run import Run
 from experiments.reconstruct.stage_store import StageStore
-from experiments.restorer_network import read_network, weights_fingerprint
 from rein3d_jax.explore.trajectories import radial_trajectories
 from rein3d_jax.io.files.atomic import write_text
+from rein3d_jax.networks.trained import read_network, weights_fingerprint
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
 from rein3d_jax.pipeline.reconstruct import ALL_PATHS, Reconstruction, joined
 from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene

@@ -15,9 +15,7 @@ class OptimizerConfig(Settings):
 
     rate: float = setting(1e-3, "learning rate, constant between warm-up and cool-down", within=_POSITIVE)
     warmup: int = setting(50, "over which the rate rises from 0", within="[0, inf)", unit="steps")
-    cooldown: int = setting(
-        0, "last ones, over which the rate falls to 0 along a cosine; 0: it stays", within="[0, inf)", unit="steps"
-    )
+    cooldown: int = setting(0, "last ones, over which the rate falls to 0 by a cosine", within="[0, inf)", unit="steps")
     weight_decay: float = setting(0.01, "of kernels, not of biases and norms", within="[0, inf)")
     momentum: float = setting(0.9, "decay of the gradient's mean", within=_DECAY)
     second_momentum: float = setting(0.98, "decay of the squared gradient's mean", within=_DECAY)

@@ -41,7 +41,8 @@ def test_a_refinement_leaves_fixed_gaussians_to_the_bit(densification, toy, fit,
 def test_fixed_ones_neither_grow_nor_go(change, toy, config) -> None:
     """All fixed, all steep, all faint: nothing happens, and a free slot is never fixed."""
     start = toy()[2]
-    state = initial_state(start.replace(opacity_logits=start.opacity_logits - 20), config, extent=2.0, fixed=start.alive | True)
+    faint = start.replace(opacity_logits=start.opacity_logits - 20)
+    state = initial_state(faint, config, extent=2.0, fixed=start.alive | True)
     assert not np.any(state.fixed & ~state.alive)
     state = state.replace(gradient_sum=jnp.ones_like(state.gradient_sum), seen=jnp.ones_like(state.seen))
     after, counts = change(state, KEY, config=config.densify)

@@ -8,6 +8,8 @@ from rein3d_jax.restore.learned.loss import LossConfig
 from rein3d_jax.restore.noise import NOISES
 from rein3d_jax.settings import Settings, setting
 
+_PRECISIONS = ("float32", "bfloat16")
+
 
 @dataclass(frozen=True)
 class ExampleDataConfig(Settings):
@@ -23,12 +25,8 @@ class ExampleDataConfig(Settings):
 class LearnedTrainConfig(TrainConfig):
     """A training run of the learned restorer."""
 
-    precision: str = setting(
-        "float32", "of the network's arithmetic; parameters and optimizer stay float32", among=("float32", "bfloat16")
-    )
-    noise: float = setting(
-        0.0, "share of examples at a noise level below 1; 0 trains the one-step prediction alone", within="[0, 1]"
-    )
+    precision: str = setting("float32", "of the network's arithmetic, not of its parameters", among=_PRECISIONS)
+    noise: float = setting(0.0, "share of examples below noise level 1; 0: one-step prediction alone", within="[0, 1]")
     noise_kind: str = setting("latitude", "correlated as pixels crowd, white, or the paper's warp", among=tuple(NOISES))
     network: NetworkConfig = NetworkConfig()
     loss: LossConfig = LossConfig()

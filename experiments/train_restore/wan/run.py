@@ -11,8 +11,8 @@ from experiments.train_restore.run import HeldOut, TrainingRun
 from experiments.train_restore.wan.config import WanTrainConfig
 from experiments.train_restore.wan.data import PairBatch, seeded_pair
 from experiments.train_restore.wan.step import FixedState, WanState, adapted, pairs_loss
-from experiments.wan_weights import write_wan
 from rein3d_jax.io.pairs.pair_shard import PairDataset
+from rein3d_jax.networks.wan import write_wan
 from rein3d_jax.parallel import gather
 from rein3d_jax.restore.blend import blend
 from rein3d_jax.restore.wan.restore import DegradedClip, DiffusionConfig, WanParams, clip_noise, restore_frames

@@ -17,9 +17,9 @@ from experiments.train_restore.wan.config import WanTrainConfig
 from experiments.train_restore.wan.data import open_pairs, pair_batches
 from experiments.train_restore.wan.run import WanRun
 from experiments.train_restore.wan.step import WanState, initial_wan_state, make_wan_step
-from experiments.wan_weights import random_wan, read_wan
 from rein3d_jax.io.files.training_checkpoint import TrainingCheckpoints
 from rein3d_jax.io.pairs.pair_shard import PairDataset
+from rein3d_jax.networks.wan import random_wan, read_wan
 from rein3d_jax.parallel import data_mesh, data_parallel, state_shardings
 from rein3d_jax.restore.wan.training.memory import GIB, Workload, require_fit
 

@@ -14,7 +14,6 @@ from jax.experimental.compilation_cache.compilation_cache import reset_cache
 
 from experiments.config import dump_config, load_config
 from experiments.example_store import ExampleStore, write_examples
-from experiments.restorer_network import read_network
 from experiments.train_restore.__main__ import main
 from experiments.train_restore.config import GuardConfig, OptimizerConfig
 from experiments.train_restore.learned.config import ExampleDataConfig, LearnedTrainConfig
@@ -22,6 +21,7 @@ from experiments.train_restore.learned.data import example_batch
 from experiments.train_restore.learned.train import train_learned
 from experiments.train_restore.run import TrainingRun
 from rein3d_jax.errors import InputError
+from rein3d_jax.networks.trained import read_network
 from rein3d_jax.restore.learned.condition import CANDIDATES, Clip
 from rein3d_jax.restore.learned.config import NetworkConfig
 from rein3d_jax.restore.learned.loss import Example

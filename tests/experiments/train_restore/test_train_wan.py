@@ -17,10 +17,10 @@ from experiments.train_restore.wan.config import PairDataConfig, WanTrainConfig
 from experiments.train_restore.wan.data import open_pairs, pair_batch, pair_batches
 from experiments.train_restore.wan.step import adapted, initial_wan_state, make_wan_step
 from experiments.train_restore.wan.train import train_wan
-from experiments.wan_weights import random_wan, read_wan, write_wan
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.training_checkpoint import TrainingCheckpoints
 from rein3d_jax.io.pairs.pair_shard import MANIFEST, write_shard
+from rein3d_jax.networks.wan import random_wan, read_wan, write_wan
 from rein3d_jax.parallel import data_mesh, data_parallel
 from rein3d_jax.restore.wan.config import DitConfig, VaeConfig, WanConfig
 from rein3d_jax.restore.wan.restore import SampleConfig
@@ -138,7 +138,7 @@ def test_what_cannot_be_trained_is_refused(folder, tmp_path, capsys):
     with pytest.raises(InputError, match="held_out takes 4"):
         open_pairs(replace(config_of(folder), data=PairDataConfig(folder, held_out=4)))
     huge = replace(config_of(folder), network=WanConfig(replace(DitConfig(), depth=3000)))
-    with pytest.raises(InputError, match="smaller preset"):
+    with pytest.raises(InputError, match="smaller network"):
         train_wan(huge)
     (tmp_path / "recipe.toml").write_text(dump_config(huge))
     assert main(["--config", str(tmp_path / "recipe.toml"), "--set", "batch=3"]) == 2

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import jax
 
-from experiments.wan_weights import read_wan
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.weights.restorer_weights import SHIPPED_RESTORER, read_restorer
+from rein3d_jax.networks.wan import read_wan
 from rein3d_jax.restore.learned.config import NetworkConfig
 from rein3d_jax.restore.learned.network import initial_parameters
 from rein3d_jax.restore.learned.sample import Learned
@@ -22,7 +22,7 @@ def read_network(config: RestoreConfig) -> TrainedNetwork | None:
     if config.method != DIFFUSION:
         return None
     if config.weights is None:
-        raise InputError("restore.weights is missing: give the folder of Wan2.1-VACE's weights (wan_weights.py)")
+        raise InputError("restore.weights is missing: give the folder of Wan2.1-VACE's weights (networks/wan.py)")
     return read_wan(config.weights, config.diffusion.network)
 
 

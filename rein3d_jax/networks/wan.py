@@ -31,7 +31,7 @@ def read_wan(folder: str | Path, config: WanConfig) -> WanParams:
     folder = Path(folder)
     for name in ("transformer", "vae", "text"):
         if not (folder / name).is_dir():
-            raise InputError(f"{folder} has no folder {name}: it needs transformer, vae and text (wan_weights.py)")
+            raise InputError(f"{folder} has no folder {name}: it needs transformer, vae and text (networks/wan.py)")
     text = _text_shapes(config)
     return WanParams(
         dit=_read(folder / "transformer", dit_rows, dit_shapes(config.dit), config.dit),
