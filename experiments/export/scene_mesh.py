@@ -1,4 +1,4 @@
-"""The mesh of a run's refined scene, to bump into: its rendered distances fused, and their surface cut out."""
+"""The mesh of a run's refined scene, for collisions: its rendered distances fused, and their surface cut out."""
 
 import dataclasses
 
@@ -8,28 +8,25 @@ from experiments.export.scene_panoramas import panoramas, viewpoints
 from experiments.run_folder import RunFolder
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.signed_distance import TRUNCATION, Field, blank_field, fuse
-from rein3d_jax.io.meshes.surface_mesh import Surface, surface, without_islands
+from rein3d_jax.io.meshes.surface_mesh import Surface, extract_surface, without_islands
 from rein3d_jax.scene import Gaussians
+from rein3d_jax.settings import Settings, setting
 
-JUMP = 3.0  # voxels; a cell spans 1.7, and more where a surface is seen at a slant alone
-MOST_SAMPLES = 64_000_000  # at 24 bytes each
-OUTLYING = 0.005  # of the splats on either side: what lies beyond a window would make the grid huge
+_JUMP = 3.0  # voxels; a cell spans 1.7, and more where a surface is seen at a slant alone
+_MAX_SAMPLES = 64_000_000  # at 24 bytes each
+_OUTLYING = 0.005  # of the splats on either side: what lies beyond a window would make the grid huge
 
 
 @dataclasses.dataclass(frozen=True)
-class MeshConfig:
-    """How fine the mesh is."""
+class MeshConfig(Settings):
+    """A mesh's fineness."""
 
-    voxel: float = 0.05  # metres
-    island: float = 0.05  # square metres; loose parts below it are dropped
-
-    def __post_init__(self):
-        if not 0.001 <= self.voxel <= 1 or not self.island >= 0:
-            raise InputError("--voxel must lie between 0.001 and 1 metres, and --island be 0 or more")
+    voxel: float = setting(0.05, "side of a voxel", within="[0.001, 1]", unit="metres")
+    island: float = setting(0.05, "loose parts below this area are dropped", within="[0, inf)", unit="square metres")
 
 
 def scene_mesh(run: RunFolder, config: MeshConfig) -> Surface:
-    """The surface of the run's scene. Raises InputError where --voxel is too fine, and without the extra `export`."""
+    """The surface of the run's scene. Raises InputError where voxels are too small, or without the extra `export`."""
     field, poses = room_field(run.refined, config.voxel), viewpoints(run)
     for frame in panoramas(run, poses):
         field = fuse(field, frame.rgb[0], frame.distance[0], frame.world_from_camera[0])
@@ -37,9 +34,9 @@ def scene_mesh(run: RunFolder, config: MeshConfig) -> Surface:
 
 
 def surface_of(field: Field) -> Surface:
-    """Where the field passes 0."""
+    """The surface where the field passes 0."""
     voxel = float(field.voxel)
-    return surface(field.signed, field.known, field.rgb, field.low, voxel, jump=JUMP * voxel)
+    return extract_surface(field.signed, field.known, field.rgb, field.low, voxel, jump=_JUMP * voxel)
 
 
 def room_field(scene: Gaussians, voxel: float) -> Field:
@@ -48,8 +45,8 @@ def room_field(scene: Gaussians, voxel: float) -> Field:
     if not len(means):
         raise InputError("the scene is empty: there is nothing to make a mesh of")
     margin = (TRUNCATION + 1) * voxel
-    low, high = (np.quantile(means, q, axis=0) for q in (OUTLYING, 1 - OUTLYING))
+    low, high = (np.quantile(means, q, axis=0) for q in (_OUTLYING, 1 - _OUTLYING))
     shape = tuple(int(n) for n in np.ceil((high - low + 2 * margin) / voxel) + 1)
-    if np.prod(shape, dtype=float) > MOST_SAMPLES:
-        raise InputError(f"--voxel {voxel} asks for {' x '.join(map(str, shape))} samples: raise it")
+    if np.prod(shape, dtype=float) > _MAX_SAMPLES:
+        raise InputError(f"voxel {voxel} asks for {' x '.join(map(str, shape))} samples: raise it")
     return blank_field(low - margin, shape, voxel)

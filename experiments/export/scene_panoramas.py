@@ -11,14 +11,14 @@ from experiments.run_folder import RunFolder
 from rein3d_jax.io.pictures.distance import write_distance_exr
 from rein3d_jax.io.pictures.exr import write_rgb_exr
 from rein3d_jax.io.pictures.image import write_rgb
-from rein3d_jax.pipeline.pipeline import origin_pose, render_video
+from rein3d_jax.pipeline.stages import origin_pose, render_video
 from rein3d_jax.scene import Video
 
-SEEN = 0.5  # alpha from which a pixel has a distance
+_SEEN = 0.5  # alpha from which a pixel has a distance
 
 
 def viewpoints(run: RunFolder) -> dict[str, jax.Array]:
-    """world_from_camera (4, 4) by name: the origin, and the middle and the end of each path."""
+    """Poses world_from_camera (4, 4) by name: the origin, and the middle and the end of each path."""
     poses, trajectories = {"origin": origin_pose()}, run.trajectories
     for path, count in enumerate(np.asarray(trajectories.counts)):
         for name, index in (("middle", count // 2), ("end", count - 1)):
@@ -28,15 +28,15 @@ def viewpoints(run: RunFolder) -> dict[str, jax.Array]:
 
 
 def panoramas(run: RunFolder, poses: dict[str, jax.Array]) -> Iterator[Video]:
-    """One frame each of the refined scene, as high as the run worked at; distance 0 where nothing is."""
+    """Videos of one frame each of the refined scene, as high as the run worked at; distance 0 where nothing is."""
     raster, height = run.config.rasterize, run.config.input.height
     for pose in poses.values():
         frame, raster = render_video(run.refined, pose[None], height, raster)
-        yield frame.replace(distance=jnp.where(frame.alpha > SEEN, frame.distance, 0.0))
+        yield frame.replace(distance=jnp.where(frame.alpha > _SEEN, frame.distance, 0.0))
 
 
 def write_panoramas(run: RunFolder, folder: Path) -> int:
-    """NAME.jpg and NAME.exr (linear light) over the run's backdrop and NAME_distance.exr; returns how many."""
+    """Writes NAME.jpg and NAME.exr (linear light) over the run's backdrop and NAME_distance.exr; returns how many."""
     poses = viewpoints(run)
     for name, frame in zip(poses, panoramas(run, poses), strict=True):
         alpha = frame.alpha[0, ..., None]

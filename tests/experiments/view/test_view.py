@@ -60,7 +60,7 @@ def test_it_is_bound_to_loopback(folder):
         assert running.server_address[0] == "127.0.0.1"
 
 
-def test_a_finished_run_is_walked_through(folder):
+def test_a_finished_run_is_shown_in_the_viewer(folder):
     with serving(folder) as ask:
         status, headers, page = ask("/")
         assert status == 200 and headers["Content-Type"] == "text/html; charset=utf-8"
@@ -116,7 +116,7 @@ def test_a_running_job_shows_how_far_it_is(folder):
         assert states == [("read", "done"), ("lift", "done"), ("explore", "done"), ("restore-00", "done"),
                           ("restore-01", "waiting"), ("refine", "waiting")]  # fmt: skip
         assert 'http-equiv="refresh"' in page and "<polyline" not in page
-        scenes = json.loads(DATA.search(ask("/walk")[2].decode())[1])["scenes"]
+        scenes = json.loads(DATA.search(ask("/viewer")[2].decode())[1])["scenes"]
         assert [scene["name"] for scene in scenes] == ["Coarse"]
         begun = (folder / "config.toml").stat().st_mtime_ns
         os.utime(folder / "stages" / "read.npz", ns=(begun - 10**9, begun - 10**9))
@@ -131,27 +131,27 @@ def test_a_job_of_another_recipe_over_a_finished_one_is_not_finished(folder):
     assert not open_run(folder).finished
 
 
-def test_before_there_is_a_scene_there_is_no_walk(folder):
+def test_before_there_is_a_scene_there_is_no_viewer(folder):
     begun_again(folder, stages=4)
     for name in ("lift", "explore", "restore-00"):
         (folder / "stages" / f"{name}.npz").unlink()
     with serving(folder) as ask:
-        assert "/walk" not in ask("/")[2].decode()
-        assert ask("/walk")[0] == 404 and ask("/coarse.spz")[0] == 404
+        assert "/viewer" not in ask("/")[2].decode()
+        assert ask("/viewer")[0] == 404 and ask("/coarse.spz")[0] == 404
 
 
-def test_refinement_so_far_is_drawn_and_walked_through(folder):
+def test_refinement_so_far_is_drawn_and_shown(folder):
     begun_again(folder, stages=5)
     snapshot = blank_snapshot(open_run(folder).config.refine)
-    curves = {**snapshot.curves, "loss": np.array([[0.0, 0.5], [50, 0.2]]), "psnr": np.array([[0.0, 20], [50, 22.0]]),
-              "count": np.array([[0.0, 100], [50, 90]])}  # fmt: skip
-    kept = {"key": np.zeros(32, np.uint8), "result": snapshot.replace(curves=curves), "seconds": np.float64(0)}
-    save(folder / "stages" / "unfinished.npz", kept)
+    values = {"loss": [0.5, 0.2], "psnr": [20.0, 22.0], "count": [100.0, 90.0]}
+    curves = snapshot.curves.replace(**{name: np.array([[0.0, a], [50.0, b]]) for name, (a, b) in values.items()})
+    stored = {"key": np.zeros(32, np.uint8), "result": snapshot.replace(curves=curves), "seconds": np.float64(0)}
+    save(folder / "stages" / "unfinished.npz", stored)
     with serving(folder) as ask:
         page = ask("/")[2].decode()
         html5lib.HTMLParser(strict=True).parse(page)
         assert page.count("<polyline") == 3
-        scenes = json.loads(DATA.search(ask("/walk")[2].decode())[1])["scenes"]
+        scenes = json.loads(DATA.search(ask("/viewer")[2].decode())[1])["scenes"]
         assert scenes[-1] == {"name": "So far", "url": "/sofar.spz"}
         assert ask("/sofar.spz")[2].startswith(b"\x1f\x8b")
         (folder / "stages" / "unfinished.npz").write_bytes(b"damaged")
