@@ -10,7 +10,7 @@ from rein3d_jax.meshes.texture import Texture
 
 MAX_TRIANGLES = 40_000_000  # at 144 bytes each, and embree's tree
 _THINNEST = 1e-14  # square metres; a thinner triangle has no plane that can be relied on
-PLAIN = -1  # the texture index of a triangle without one
+_PLAIN = -1  # the texture index of a triangle without one
 _Z_UP_FROM_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
@@ -21,7 +21,7 @@ class Triangles:
     corners: np.ndarray  # (n, 3, 3) float64 metres
     uv: np.ndarray  # (n, 3, 2) float32, 0 where plain
     colour: np.ndarray  # (n, 3) float32 sRGB, which the texture is multiplied by
-    textured: np.ndarray  # (n,) int32 index into textures, or PLAIN
+    textured: np.ndarray  # (n,) int32 index into textures, or _PLAIN
     textures: tuple[Texture, ...]
 
 
@@ -43,7 +43,7 @@ def triangles(
     if not (np.isfinite(corners).all() and np.isfinite(places).all()):
         raise ValueError("vertices or texture coordinates are not finite")
     colours = np.broadcast_to(np.asarray(colour, np.float32), (len(faces), 3))
-    index = np.full(len(faces), 0 if wraps else PLAIN, np.int32)
+    index = np.full(len(faces), 0 if wraps else _PLAIN, np.int32)
     return Triangles(corners, places, colours, index, (picture,) if wraps else ())
 
 
@@ -89,5 +89,5 @@ def _with_area(part: Triangles) -> Triangles:
 
 
 def _renumbered(part: Triangles, place: dict[int, int]) -> np.ndarray:
-    indices = np.array([place[id(picture)] for picture in part.textures] + [PLAIN], np.int32)  # PLAIN is the last
+    indices = np.array([place[id(picture)] for picture in part.textures] + [_PLAIN], np.int32)  # _PLAIN is the last
     return indices[part.textured]

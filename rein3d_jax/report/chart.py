@@ -52,10 +52,10 @@ def legend(entries: list[tuple[str, str]]) -> str:
     return f'<ul class="legend">{"".join(items)}</ul>'
 
 
-Ticks = Iterable[tuple[float, float]]  # (where it stands on the page, its number)
+_Ticks = Iterable[tuple[float, float]]  # (where it stands on the page, its number)
 
 
-def axes(across: Ticks, up: Ticks, labels: tuple[str, str], *, grid: bool = False) -> str:
+def axes(across: _Ticks, up: _Ticks, labels: tuple[str, str], *, grid: bool = False) -> str:
     """SVG of both axes with their labels (x, y) and horizontal lines; with `grid` vertical ones as well."""
     x_label, y_label = map(escape, labels)
     middle_x, middle_y = (LEFT + RIGHT) / 2, (TOP + BOTTOM) / 2

@@ -67,18 +67,14 @@ def _textures(key: jax.Array, kind: jax.Array, furniture: Furniture) -> Textures
     accent = jax.random.bernoulli(accent_key, 0.55) & (jnp.arange(4) == jax.random.randint(which_key, (), 0, 4))
     walls = jnp.where(accent, GROUP_INDEX["accent"], wall)
     fixed = [floor, GROUP_INDEX["ceiling"], *walls, *[GROUP_INDEX["leaf_of_door"]] * OPENINGS, wall]
-    groups = jnp.concatenate([jnp.stack([jnp.asarray(x) for x in fixed]), texture_groups_of(furniture).reshape(-1)])
+    of_pieces = jnp.asarray(texture_groups())[furniture.piece].reshape(-1)
+    groups = jnp.concatenate([jnp.stack([jnp.asarray(x) for x in fixed]), of_pieces])
     textures = draw_textures(draw_key, groups)
     plain = jnp.argsort(accent)  # walls that do not stand out come first
     copied = jnp.where(jax.random.bernoulli(alike_key, 0.75, (4,)), plain[0], plain[1])
     source = jnp.where(accent, jnp.arange(4), copied) + 2
     source = jnp.arange(len(groups)).at[2:6].set(source).at[_FIRST_STRUCTURE].set(source[0])
     return jax.tree.map(lambda x: x[source], textures)
-
-
-def texture_groups_of(furniture: Furniture) -> jax.Array:
-    """What each piece is made of (SLOTS, MAX_TEXTURES), as indices into materials.GROUPS."""
-    return jnp.asarray(texture_groups())[furniture.piece]
 
 
 def _solids(plan: Plan, furniture: Furniture, parts: Parts, config: RoomConfig) -> tuple[dict[str, Solids], jax.Array]:

@@ -10,7 +10,7 @@ from rein3d_jax.rooms.materials import linear_from_hsv
 from rein3d_jax.rooms.model import Lights, Openings, Outside, Textures
 from rein3d_jax.rooms.plan import Plan
 
-LIGHTS = 3  # a ceiling lamp, a window (else a second ceiling lamp), a floor lamp (else a second window)
+_LIGHTS = 3  # a ceiling lamp, a window (else a second ceiling lamp), a floor lamp (else a second window)
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709
 
 
@@ -36,12 +36,12 @@ def draw_lights(key: jax.Array, plan: Plan, furniture: Furniture, openings: Open
         jnp.where(is_lamp.any(), lamp_top, jnp.where(panes[1][2], panes[1][0], at_ceiling[1])),
     ])  # fmt: skip
     axis = jnp.stack([jnp.array([0.0, 0.0, -1.0]), panes[0][1], panes[1][1]])
-    strength = jnp.exp(jax.random.uniform(strength_key, (LIGHTS,), minval=-1.6, maxval=0.9))
+    strength = jnp.exp(jax.random.uniform(strength_key, (_LIGHTS,), minval=-1.6, maxval=0.9))
     on = jnp.array([1.0, 1.0, 0.5]) * strength * jnp.where(use_window, 2.5, 1.0)
-    hue, tint = jax.random.uniform(colour_key, (2, LIGHTS))
-    warm = linear_from_hsv(0.06 + 0.07 * hue, 0.22 * tint, jnp.ones(LIGHTS))
-    cold = linear_from_hsv(0.55 + 0.08 * hue, 0.15 * tint, jnp.ones(LIGHTS))
-    radius = jax.random.uniform(radius_key, (LIGHTS,), minval=0.1, maxval=0.3)
+    hue, tint = jax.random.uniform(colour_key, (2, _LIGHTS))
+    warm = linear_from_hsv(0.06 + 0.07 * hue, 0.22 * tint, jnp.ones(_LIGHTS))
+    cold = linear_from_hsv(0.55 + 0.08 * hue, 0.15 * tint, jnp.ones(_LIGHTS))
+    radius = jax.random.uniform(radius_key, (_LIGHTS,), minval=0.1, maxval=0.3)
     return Lights(
         position=position,
         radius=jnp.where(use_window, 0.5, radius),

@@ -16,13 +16,13 @@ def tone_map(linear: np.ndarray) -> np.ndarray:
     NaN and negative light count as 0, infinite light as the brightest finite value. The result does not change
     when the input is multiplied by a constant or rotated about the vertical.
     """
-    linear = finite_light(linear)
+    linear = _finite_light(linear)
     with np.errstate(over="ignore"):  # inf is cut to _SATURATED
         exposed = np.minimum(linear * exposure(linear), np.float32(_SATURATED))
     return srgb_from_linear(np.clip(filmic(exposed), 0, 1))
 
 
-def finite_light(linear: np.ndarray) -> np.ndarray:
+def _finite_light(linear: np.ndarray) -> np.ndarray:
     """Light of any shape, made finite and not negative, float32."""
     linear = np.asarray(linear, np.float32)
     brightest = np.max(linear, initial=0.0, where=np.isfinite(linear))

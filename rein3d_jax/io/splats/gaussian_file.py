@@ -1,6 +1,7 @@
 """A scene's file, its format by its suffix: .ply (3DGS), .compressed.ply (SuperSplat), .spz, .splat."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from rein3d_jax.errors import InputError
@@ -34,7 +35,8 @@ def write_splats(path: str | Path, gaussians: Gaussians, *, antialias: bool = Fa
     """Writes the alive slots to `path`, atomically; what a format cannot hold is in its module. `antialias` is
     write_ply's; .compressed.ply and .splat have no place for it. Raises InputError."""
     write = _format(path)[1]
-    write(path, gaussians, **({"antialias": antialias} if write in (write_ply, write_spz) else {}))
+    write = partial(write, antialias=antialias) if write in (write_ply, write_spz) else write
+    write(path, gaussians)
 
 
 def _format(path: str | Path) -> tuple[Callable[..., Gaussians], Callable[..., None]]:

@@ -18,7 +18,7 @@ _PICTURES = ({"picture": 3, "wall_shelf": 1, "mirror": 0.5}, {"picture": 3, "wal
 _LAMP = {"pendant": 3, "ceiling_disc": 3, "spots": 1.5}
 _GREEN = {"plant": 3, "tall_plant": 1.5, "none": 1.5}
 # What each kind of room holds: one piece for each row, drawn by weight, placed in this order: large things first.
-PROGRAMS = {
+_PROGRAMS = {
     "living_dining": (
         _LAMP, {"dining": 4, "round_dining": 2}, {"sofa": 4, "corner_sofa": 2}, {"tv_unit": 4, "cabinet": 1},
         {"shelf": 3, "cabinet": 2, "wardrobe": 1, "open_shelf": 2}, {"coffee_table": 4, "round_table": 2, "pouf": 1},
@@ -58,7 +58,7 @@ def program_weights() -> np.ndarray:
     """Weights (kinds, SLOTS, pieces + 1); the last column is no piece."""
     table = np.zeros((len(ROOM_KINDS), SLOTS, NO_PIECE + 1), np.float32)
     for kind, name in enumerate(ROOM_KINDS):
-        for slot, weights in enumerate(PROGRAMS[name]):
+        for slot, weights in enumerate(_PROGRAMS[name]):
             for piece, weight in weights.items():
                 table[kind, slot, NO_PIECE if piece == "none" else PIECE_NAMES.index(piece)] = weight
     return table

@@ -10,7 +10,7 @@ from rein3d_jax.rooms.furniture.bounds import Bounds, M
 BOX, CYLINDER, ELLIPSOID = 0, 1, 2
 MAX_PARTS = 32  # of a piece
 MAX_TEXTURES = 4  # of a piece
-Range = tuple[float, float]
+_Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,12 @@ class Piece:
     ceiling  anywhere under the ceiling"""
 
     place: str
-    width: Range  # metres
-    depth: Range
-    height: Range
+    width: _Range  # metres
+    depth: _Range
+    height: _Range
     textures: tuple[str, ...]  # names in materials.GROUPS
     parts: tuple[Part, ...]
-    lift: Range = (0.0, 0.0)  # metres from the floor to its lower end; from the ceiling to its upper end
+    lift: _Range = (0.0, 0.0)  # metres from the floor to its lower end; from the ceiling to its upper end
 
 
 def legs(texture: int, x: Bounds, y: Bounds, top: np.ndarray, thick: float = 0.05) -> tuple[Part, ...]:
