@@ -1,15 +1,15 @@
-"""What each choice of the main job buys: a table of variants over rooms, PSNR at novel views, count and seconds.
+"""Tables of what each choice of the main job buys, over rooms: PSNR at novel views, count and seconds.
 
-    python -m benchmarks.studies.scene TABLE [--rooms ../shared/rooms] [--limit N] [--json FILE]
+    python -m benchmarks.studies.scene TABLE --rooms FOLDER [--limit N] [--json FILE]
 
 Every row is quick.toml at half its size with some keys changed. Stages that two rows share are made once. Seconds are
 those of a row's stages, the median over rooms: the first ones compile.
 """
 
-import argparse
 import hashlib
 import itertools
 import json
+import sys
 from collections import deque
 from pathlib import Path
 from time import perf_counter
@@ -18,9 +18,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from experiments.command import CommandParser
 from experiments.compiled_programs import forget_when_many
 from experiments.config import load_config
-from experiments.evaluate.room import Room, room_folders
+from experiments.evaluate.room import EvaluationRoom, RoomSource, room_sources
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.quality import is_novel, render_views
 from rein3d_jax.evaluate.metrics import psnr
@@ -33,7 +34,7 @@ from rein3d_jax.pipeline.survey import Survey, lift_scene, room_background
 from rein3d_jax.restore import restorer
 from rein3d_jax.scene import Gaussians
 
-RECIPE = "experiments/recipes/quick.toml"
+RECIPE = "quick"
 SIZE = ("input.height=128", "restore.height=128", "lift.share=1.0", "refine.views.size=64", "refine.steps=200",
         "refine.evaluate_every=200")  # fmt: skip
 GROWING = ("refine.densification=default", "refine.densify.start=25", "refine.densify.every=25",
@@ -87,8 +88,8 @@ def tables() -> dict[str, dict[str, tuple[str, ...]]]:
 class Bench:
     """A room, and what was made of it so far."""
 
-    def __init__(self, folder: Path):
-        self.folder, self.made = folder, {}
+    def __init__(self, source: RoomSource):
+        self.source, self.made = source, {}
 
     def once(self, key, make):
         """(result, seconds): made when first asked for."""
@@ -100,7 +101,7 @@ class Bench:
 
     def fused(self, config: ReconstructConfig) -> tuple[list[Explored], float]:
         """The state after each path, and the seconds of all stages so far."""
-        room = Room(self.folder, config)
+        room = EvaluationRoom(self.source, config)
         panorama, _ = self.once(config.input.height, lambda: room.panorama)
         coarse, lifting = self.once(config.lift, lambda: lift_scene(panorama, config.lift))
         paths, _ = self.once(config.explore, lambda: radial_trajectories(panorama, config=config.explore))
@@ -128,7 +129,7 @@ class Bench:
     def row(self, config: ReconstructConfig) -> dict:
         """PSNR meaned over the novel views, Gaussians, seconds, paths that were restored, and a digest of the scene."""
         scene, seconds = self.refined(config)
-        room = Room(self.folder, config)
+        room = EvaluationRoom(self.source, config)
         views = [view for view in room.traced.views if is_novel(view)]
         pictures = render_views(scene, views, room.backdrop, config=config.rasterize)
         found = float(np.mean([psnr(picture, view.rgb) for picture, view in zip(pictures, views, strict=True)]))
@@ -152,36 +153,39 @@ def _error(values: list[float]) -> float:
     return float(np.std(values, ddof=1)) / len(values) ** 0.5 if len(values) > 1 else 0.0
 
 
-def measure(variants: dict[str, tuple[str, ...]], folders: list[Path]) -> dict[str, list[dict]]:
+def measure(variants: dict[str, tuple[str, ...]], sources: list[RoomSource]) -> dict[str, list[dict]]:
     """Row -> a figure for each room, room by room: what rows share is kept no longer than a room."""
     found = {name: [] for name in variants}
-    for folder in folders:
-        bench = Bench(folder)
+    for source in sources:
+        bench = Bench(source)
         for name, keys in variants.items():
             found[name].append(bench.row(load_config(ReconstructConfig, RECIPE, [*SIZE, *keys])))
-            print(folder.name, name, found[name][-1], flush=True)
+            print(source.name, name, found[name][-1], flush=True)
             forget_when_many()
     return found
 
 
-def main() -> None:
-    """Prints a line a row, and writes the table as JSON."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main(arguments: list[str] | None = None) -> int:
+    """Prints a line a row."""
+    parser = CommandParser("studies.scene", __doc__, "benchmarks")
     parser.add_argument("table", choices=tables())
-    parser.add_argument("--rooms", default="../shared/rooms")
+    parser.add_argument("--rooms", metavar="FOLDER", required=True)
     parser.add_argument("--limit", type=int, help="rooms at most")
-    parser.add_argument("--json", metavar="FILE")
-    options = parser.parse_args()
-    variants, folders = tables()[options.table], room_folders(options.rooms, options.limit)
-    found = measure(variants, folders)
+    parser.add_argument("--json", metavar="FILE", help="write the table there")
+    return parser.run(_run, arguments)
+
+
+def _run(options) -> None:
+    sources = room_sources(options.rooms, options.limit)
+    found = measure(tables()[options.table], sources)
     base = next(iter(found.values()))
     rows = {name: summary(rows, base) | {"each": rows} for name, rows in found.items()}
     for name, row in rows.items():
         print(f"{name:36s}", {key: value for key, value in row.items() if key != "each"})
     if options.json:
-        table = {"recipe": RECIPE, "changed": SIZE, "rooms": [folder.name for folder in folders], "rows": rows}
+        table = {"recipe": RECIPE, "changed": SIZE, "rooms": [source.name for source in sources], "rows": rows}
         write_text(Path(options.json), json.dumps(table, indent=1) + "\n")
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -10,25 +10,27 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 
-from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.morphology import closing
 from rein3d_jax.geometry.push_pull import push_pull
+from rein3d_jax.settings import Settings, setting
 
 
 @dataclass(frozen=True)
-class CompleteConfig:
-    speck: int = 4  # pixels: unknown regions that a closing of this radius covers belong to the surface around them
-    far: float = 10.0  # times the median known distance: where everything else unknown is placed
+class CompleteConfig(Settings):
+    """The completion's settings: where the pixels of unknown distance are placed."""
 
-    def __post_init__(self):
-        if self.speck < 0 or self.far < 1:
-            raise InputError("depth.speck must be at least 0 and depth.far at least 1")
+    speck: int = setting(
+        4, "radius of the closing whose unknown regions belong to the surface around them", within="[0, inf)",
+        unit="pixels",
+    )  # fmt: skip
+    far: float = setting(10.0, "distance of everything else unknown, over the median known distance", within="[1, inf)")
 
 
 def _complete_distance(distance: jax.Array, valid: jax.Array, *, config: CompleteConfig) -> jax.Array:
-    """(h, w) metres, (h, w) bool -> (h, w) metres, equal to `distance` where valid, finite everywhere whatever
-    stands in the unknown pixels. Where nothing at all is known: 0. Inverse distance is what is averaged: a
-    plane's is linear in the ray, so a smooth fill bends a wall little, and far things do not outvote near ones."""
+    """The distance of every pixel: (h, w) metres, (h, w) bool -> (h, w) metres, equal to `distance` where valid, finite
+    everywhere whatever stands in the unknown pixels. Where nothing at all is known: 0. Inverse distance is what is
+    averaged: a plane's is linear in the ray, so a smooth fill bends a wall little, and far things do not outvote near
+    ones."""
     assert distance.shape == valid.shape, (distance.shape, valid.shape)
     inverse = jnp.where(valid, 1 / jnp.where(valid, distance, 1.0), 0.0)[..., None]
     smooth = push_pull(inverse, valid.astype(distance.dtype))[..., 0]

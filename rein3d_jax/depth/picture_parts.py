@@ -12,19 +12,19 @@ from rein3d_jax.depth.picture_edges import OPPONENT
 from rein3d_jax.geometry.sphere import pixel_solid_angles
 
 ROWS = 32  # of the small picture whose pixels are counted
-LEVELS = 4  # of each opponent channel
+_LEVELS = 4  # of each opponent channel
 
 
 def colour_bins(rgb: jax.Array) -> jax.Array:
-    """(h, 2h, 3) sRGB -> (2 ROWS^2, LEVELS^3): the bin of each pixel of a small picture, one-hot, times its share
+    """(h, 2h, 3) sRGB -> (2 ROWS^2, _LEVELS^3): the bin of each pixel of a small picture, one-hot, times its share
     of the sphere. A bin is a quarter of the spread of luminance and of both chroma channels; a channel with little
     spread, as in a grey picture, is held to a tenth of the strongest, so that noise stays in one bin."""
     small = jax.image.resize(rgb, (ROWS, 2 * ROWS, 3), "linear").reshape(-1, 3) @ jnp.array(OPPONENT).T
     spread = jnp.std(small, axis=0)
     quantiles = norm.cdf((small - jnp.mean(small, axis=0)) / jnp.maximum(spread, 0.1 * jnp.max(spread)))
-    levels = jnp.minimum(jnp.floor(quantiles * LEVELS), LEVELS - 1).astype(jnp.int32)
+    levels = jnp.minimum(jnp.floor(quantiles * _LEVELS), _LEVELS - 1).astype(jnp.int32)
     share = pixel_solid_angles(ROWS, 2 * ROWS).reshape(-1, 1) / (4 * jnp.pi)
-    return jax.nn.one_hot(levels @ jnp.array([LEVELS**2, LEVELS, 1]), LEVELS**3) * share
+    return jax.nn.one_hot(levels @ jnp.array([_LEVELS**2, _LEVELS, 1]), _LEVELS**3) * share
 
 
 def mutual_information(parts: jax.Array, bins: jax.Array) -> jax.Array:

@@ -24,36 +24,58 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.safe import safe_norm
 from rein3d_jax.geometry.shell import RoomShell, meet_shell
 from rein3d_jax.geometry.sphere import pixel_rays
+from rein3d_jax.settings import Settings, setting
 
-WORKING_HEIGHT = 256  # pixels; the noise and blur scales are tied to it
-WIDE, SHARP = (1.0, 3.0), (0.7, 2.0)  # pixels of blur: to find the basin, and to end in it
-COARSE, FINE = 12, 32  # points along each line: to rank boxes, and to refine one
-STEPS = 0.7, 0.02  # log metres; how far the first and the last round of climbing reach
-YAW_STEP = 0.35  # radians for one log metre
-CHANGED = 0.4  # share of a child's parts that differ from its parent's
-SIZES = 41  # tried for each box, from 1/e to e times its own
+_WORKING_HEIGHT = 256  # pixels; the noise and blur scales are tied to it
+_WIDE, _SHARP = (1.0, 3.0), (0.7, 2.0)  # pixels of blur: to find the basin, and to end in it
+_COARSE, _FINE = 12, 32  # points along each line: to rank boxes, and to refine one
+_STEPS = 0.7, 0.02  # log metres; how far the first and the last round of climbing reach
+_YAW_STEP = 0.35  # radians for one log metre
+_CHANGED = 0.4  # share of a child's parts that differ from its parent's
+_SIZES = 41  # tried for each box, from 1/e to e times its own
 
 
 @dataclass(frozen=True)
-class RoomShellConfig:
-    """How a room is fitted. Ranges are in camera heights and only lean on the fit: they are no walls."""
+class RoomShellConfig(Settings):
+    """The room fit's settings. Ranges only lean on the fit: rooms may be larger or smaller."""
 
-    camera_height: float = 1.6  # metres above the floor: the scale of everything
-    wall_range: tuple[float, float] = (0.6, 5.0)  # 1 to 8 m for a camera at 1.6 m
-    ceiling_range: tuple[float, float] = (0.375, 1.6)  # above the camera: 0.6 to 2.5 m
-    max_aspect: float = 2.0
-    prior: float = 0.3  # loss for one squared log unit outside the ranges
-    # Floor, ceiling and corner lines. Nothing stands before a ceiling line; furniture hides floor lines, and doors,
-    # windows and cupboards have vertical lines of their own.
-    edge_weights: tuple[float, float, float] = (0.5, 1.0, 0.5)
-    colour_weight: float = 0.7  # of one nat of mutual information, against full edge support
-    noise: float = 0.005  # picture_edges: the sRGB step per pixel that is half an edge
-    texture: float = 1.0  # picture_edges: how much an edge must stand out of its surroundings
-    climbers: int = 512
-    rounds: int = 16
-    children: int = 11
-    finalists: int = 8
-    seed: int = 0
+    camera_height: float = setting(
+        1.6, "height of the camera above the floor, the scale of everything", within="(0, inf)", unit="metres"
+    )
+    wall_range: tuple[float, float] = setting(
+        (0.6, 5.0), "usual distances of walls (1 to 8 m for a camera at 1.6 m)", within="(0, inf)",
+        unit="camera heights",
+    )  # fmt: skip
+    ceiling_range: tuple[float, float] = setting(
+        (0.375, 1.6), "usual heights of the ceiling above the camera (0.6 to 2.5 m)", within="(0, inf)",
+        unit="camera heights",
+    )  # fmt: skip
+    max_aspect: float = setting(2.0, "usual length over width of a room, at most", within="[1, inf)")
+    prior: float = setting(0.3, "loss of one squared log unit outside the ranges", within="[0, inf)")
+    # Nothing stands before a ceiling line; furniture hides floor lines, and doors, windows and cupboards have vertical
+    # lines of their own.
+    edge_weights: tuple[float, float, float] = setting(
+        (0.5, 1.0, 0.5), "weights of floor, ceiling and corner lines", within="[0, inf)"
+    )
+    colour_weight: float = setting(
+        0.7, "weight of one nat of mutual information, against full edge support", within="[0, inf)"
+    )
+    noise: float = setting(0.005, "sRGB step per pixel that is half an edge", within="(0, inf)")
+    texture: float = setting(1.0, "times its surroundings' mean energy that an edge must have", within="[0, inf)")
+    climbers: int = setting(512, "boxes that climb from random starts", within="[1, inf)")
+    rounds: int = setting(16, "rounds of climbing", within="[1, inf)")
+    children: int = setting(11, "tries of each box in a round", within="[1, inf)")
+    finalists: int = setting(8, "boxes that are refined in the end", within="[1, inf)")
+    seed: int = setting(0, "seed of the random starts", within="[0, 4294967295]")
+
+    def __post_init__(self):
+        super().__post_init__()
+        for name in ("wall_range", "ceiling_range"):
+            low, high = getattr(self, name)
+            if low >= high:
+                raise InputError(f"{name} must be two numbers, the smaller first, not {low}, {high}")
+        if not any(self.edge_weights):
+            raise InputError("edge_weights must not all be 0")
 
 
 @struct.dataclass
@@ -72,7 +94,7 @@ def fit_room_shell(rgb: jax.Array, *, config: RoomShellConfig) -> tuple[RoomShel
     Deterministic for a seed. Raises InputError for a picture without edges."""
     height, width, channels = rgb.shape
     assert width == 2 * height and channels == 3, rgb.shape
-    small = jax.image.resize(rgb, (WORKING_HEIGHT, 2 * WORKING_HEIGHT, 3), "linear")
+    small = jax.image.resize(rgb, (_WORKING_HEIGHT, 2 * _WORKING_HEIGHT, 3), "linear")
     # The fit is made in camera heights: another height compiles nothing anew.
     camera_height, config = config.camera_height, replace(config, camera_height=1.0)
     evidence = _evidence(small, config=config)
@@ -99,7 +121,7 @@ def _shell_from(params: jax.Array, camera_height: float) -> RoomShell:
 @partial(jax.jit, static_argnames=("config",))
 def _evidence(rgb: jax.Array, config: RoomShellConfig) -> _Evidence:
     tensors = edge_tensors(rgb, noise=config.noise, texture=config.texture)
-    wide, sharp = (sum(blur(tensors, sigma) for sigma in sigmas) / len(sigmas) for sigmas in (WIDE, SHARP))
+    wide, sharp = (sum(blur(tensors, sigma) for sigma in sigmas) / len(sigmas) for sigmas in (_WIDE, _SHARP))
     return _Evidence(wide, sharp, colour_bins(rgb))
 
 
@@ -130,14 +152,14 @@ def _unlikely(box: jax.Array, config: RoomShellConfig) -> jax.Array:
 
 def _edge_loss(box: jax.Array, evidence: _Evidence, config: RoomShellConfig) -> jax.Array:
     """What ranks boxes during the climb."""
-    support = _support(_shell_from(box, 1.0), evidence.wide, COARSE, config.edge_weights)
+    support = _support(_shell_from(box, 1.0), evidence.wide, _COARSE, config.edge_weights)
     return 1 - support + config.prior * _unlikely(box, config)
 
 
 def _loss(box: jax.Array, evidence: _Evidence, config: RoomShellConfig) -> tuple[jax.Array, jax.Array]:
     """What is minimised in the end, and the edge support in it."""
     shell = _shell_from(box, 1.0)
-    support = _support(shell, evidence.sharp, FINE, config.edge_weights)
+    support = _support(shell, evidence.sharp, _FINE, config.edge_weights)
     information = mutual_information(shell_parts(shell, ROWS, 2 * ROWS).reshape(-1, 3), evidence.bins)
     return 1 - support - config.colour_weight * information + config.prior * _unlikely(box, config), support
 
@@ -153,9 +175,9 @@ def _climb(boxes: jax.Array, key: jax.Array, step: jax.Array, evidence: _Evidenc
     """Each box becomes the best of itself and of its children; (n, 6) -> (n, 6), (n,) losses. A child differs in
     some of its parts, so that one wrong wall can be mended alone; its lengths tend to change together."""
     parts, whole, chosen = jax.random.split(key, 3)
-    noise = jax.random.normal(parts, (config.children, *boxes.shape)).at[..., 0].multiply(YAW_STEP)
+    noise = jax.random.normal(parts, (config.children, *boxes.shape)).at[..., 0].multiply(_YAW_STEP)
     noise = noise.at[..., 1:].add(jax.random.normal(whole, (config.children, len(boxes), 1)))
-    noise *= jax.random.bernoulli(chosen, CHANGED, noise.shape)
+    noise *= jax.random.bernoulli(chosen, _CHANGED, noise.shape)
     family = jnp.concatenate([boxes[None], boxes + step * noise])
     # In batches that stay within a few MB.
     losses = jax.lax.map(lambda box: _edge_loss(box, evidence, config), family.reshape(-1, 6), batch_size=512)
@@ -164,7 +186,7 @@ def _climb(boxes: jax.Array, key: jax.Array, step: jax.Array, evidence: _Evidenc
 
 
 def _best_size(box: jax.Array, evidence: _Evidence, config: RoomShellConfig) -> jax.Array:
-    sizes = box + jnp.linspace(-1, 1, SIZES)[:, None] * jnp.array([0.0, 1, 1, 1, 1, 1])
+    sizes = box + jnp.linspace(-1, 1, _SIZES)[:, None] * jnp.array([0.0, 1, 1, 1, 1, 1])
     return sizes[jnp.argmin(jax.vmap(lambda box: _loss(box, evidence, config)[0])(sizes))]
 
 
@@ -172,7 +194,7 @@ def _best_size(box: jax.Array, evidence: _Evidence, config: RoomShellConfig) -> 
 def _search(evidence: _Evidence, config: RoomShellConfig) -> jax.Array:
     """(finalists, 6): the best of many boxes that climbed from random starts, each in its best size."""
     key, start = jax.random.split(jax.random.key(config.seed))
-    steps = STEPS[0] * (STEPS[1] / STEPS[0]) ** jnp.linspace(0, 1, config.rounds)
+    steps = _STEPS[0] * (_STEPS[1] / _STEPS[0]) ** jnp.linspace(0, 1, config.rounds)
     rounds = (jax.random.split(key, config.rounds), steps)
     boxes = _random_boxes(start, config)
     boxes, losses = jax.lax.scan(lambda boxes, x: _climb(boxes, *x, evidence, config), boxes, rounds)

@@ -12,16 +12,16 @@ from rein3d_jax.geometry.shell import RoomShell, meet_shell
 from rein3d_jax.geometry.sphere import pixel_rays, pixel_solid_angles
 from rein3d_jax.scene import Panorama
 
-OUTLIERS = 0.01  # share of the sphere that may lie beyond a face: a doorway, a few wrong pixels
-YAWS = 90  # tries over a quarter turn: to 1 degree, at which a 5 m wall is off by 4 cm at its ends
-ON_SHELL = 0.05  # relative distance within which a pixel counts as lying on the box
+_OUTLIERS = 0.01  # share of the sphere that may lie beyond a face: a doorway, a few wrong pixels
+_YAWS = 90  # tries over a quarter turn: to 1 degree, at which a 5 m wall is off by 4 cm at its ends
+_ON_SHELL = 0.05  # relative distance within which a pixel counts as lying on the box
 
 
 def _quantiles(values: jax.Array, weights: jax.Array) -> jax.Array:
-    """(2,) the OUTLIERS and 1 - OUTLIERS weighted quantiles of (n,)."""
+    """(2,) the _OUTLIERS and 1 - _OUTLIERS weighted quantiles of (n,)."""
     order = jnp.argsort(values)
     cumulative = jnp.cumsum(weights[order]) / jnp.sum(weights)
-    found = jnp.searchsorted(cumulative, jnp.array([OUTLIERS, 1 - OUTLIERS]))
+    found = jnp.searchsorted(cumulative, jnp.array([_OUTLIERS, 1 - _OUTLIERS]))
     return values[order][jnp.minimum(found, values.shape[0] - 1)]
 
 
@@ -29,7 +29,7 @@ def _quantiles(values: jax.Array, weights: jax.Array) -> jax.Array:
 def shell_from_distance(panorama: Panorama) -> tuple[RoomShell, jax.Array]:
     """(shell, support): support () in [0, 1] is the share of the known sphere that lies on the shell.
 
-    The yaw is the one whose bounding rectangle is smallest, as a box's is when it is seen square on.
+    The yaw is the one whose bounding rectangle is smallest, as a box's is along its own axes.
     """
     height, width = panorama.distance.shape
     stride = max(height // 64, 1)  # the sorts below cost by the pixel, and quantiles need no more of them
@@ -40,11 +40,11 @@ def shell_from_distance(panorama: Panorama) -> tuple[RoomShell, jax.Array]:
     points = rays * jnp.where(known, distance, 0.0)[:, None]
 
     def rectangle(yaw):
-        turned = jnp.matmul(points, matrix_from_quats(yaw_quat(yaw)), precision="highest")
-        return jnp.stack([_quantiles(turned[:, 0], weights), _quantiles(turned[:, 1], weights)])
+        rotated = jnp.matmul(points, matrix_from_quats(yaw_quat(yaw)), precision="highest")
+        return jnp.stack([_quantiles(rotated[:, 0], weights), _quantiles(rotated[:, 1], weights)])
 
-    yaws = jnp.arange(YAWS) * (jnp.pi / 2 / YAWS)
-    rectangles = jax.lax.map(rectangle, yaws)  # (YAWS, 2, 2)
+    yaws = jnp.arange(_YAWS) * (jnp.pi / 2 / _YAWS)
+    rectangles = jax.lax.map(rectangle, yaws)  # (_YAWS, 2, 2)
     best = jnp.argmin(jnp.prod(rectangles[..., 1] - rectangles[..., 0], axis=-1))
     (back, front), (right, left) = rectangles[best]
     low, high = _quantiles(points[:, 2], weights)
@@ -56,5 +56,5 @@ def shell_from_distance(panorama: Panorama) -> tuple[RoomShell, jax.Array]:
         ceiling=jnp.maximum(high, 0.05),
     )
     expected, _ = meet_shell(shell, jnp.zeros(3), rays)
-    on_shell = jnp.abs(distance / expected - 1) < ON_SHELL
+    on_shell = jnp.abs(distance / expected - 1) < _ON_SHELL
     return shell, jnp.sum(weights * on_shell) / jnp.maximum(jnp.sum(weights), 1e-9)

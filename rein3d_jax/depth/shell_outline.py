@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from rein3d_jax.geometry.shell import RoomShell, world_from_shell
 from rein3d_jax.geometry.sphere import pixel_rays
 
-SHARPNESS = 30.0  # where two planes are equally far a ray belongs half to each; where one is 10 % nearer, 95 %
+_SHARPNESS = 30.0  # where two planes are equally far a ray belongs half to each; where one is 10 % nearer, 95 %
 
 
 def shell_edges(shell: RoomShell) -> tuple[jax.Array, jax.Array]:
@@ -26,5 +26,5 @@ def shell_parts(shell: RoomShell, height: int, width: int) -> jax.Array:
     x, y, z = jnp.moveaxis(pixel_rays(height, width) @ world_from_shell(shell), -1, 0)
     planes = jnp.concatenate([shell.walls, shell.ceiling[None], shell.floor[None]])
     nearness = jnp.stack([x, y, -x, -y, z, -z], axis=-1) / planes  # 1 / metres, negative behind the ray
-    parts = jax.nn.softmax(SHARPNESS * jnp.log(jnp.maximum(nearness, 1e-6)), axis=-1)
+    parts = jax.nn.softmax(_SHARPNESS * jnp.log(jnp.maximum(nearness, 1e-6)), axis=-1)
     return jnp.stack([jnp.sum(parts[..., :4], axis=-1), parts[..., 4], parts[..., 5]], axis=-1)

@@ -1,7 +1,7 @@
 """What is still unseen: space behind the surfaces that the input panorama saw, the only place for a guess.
 
 Whatever lies in front of an observed surface would have been seen; so a restored surface found there is wrong, however
-well it looks from where it was restored, and would stand in the way everywhere else.
+well it renders where it was restored, and would stand in the way everywhere else.
 """
 
 import jax
@@ -10,13 +10,13 @@ import jax.numpy as jnp
 from rein3d_jax.geometry.sphere import pixels_from_rays
 from rein3d_jax.scene import Panorama
 
-STEPS = 24  # places tried along a ray, 6 % apart; even, so that the guess itself is one of them
-MARGIN = 0.02  # relative: what lies this little in front of a surface lies on it
+_STEPS = 24  # places tried along a ray, 6 % apart; even, so that the guess itself is one of them
+_MARGIN = 0.02  # relative: what lies this little in front of a surface lies on it
 
 
-def depth(panorama: Panorama, points: jax.Array) -> jax.Array:
-    """(...) of points (..., 3), world: their distance over that of the surface which `panorama` (at the world's origin)
-    shows in their direction. Below 1 is seen to be empty, above 1 hidden."""
+def relative_distance(panorama: Panorama, points: jax.Array) -> jax.Array:
+    """The distance of points (..., 3), world, over that of the surface which `panorama` (at the world's origin) shows
+    in their direction: (...), below 1 where space was seen to be empty, above 1 where it is hidden."""
     height, width = panorama.distance.shape
     u, v = pixels_from_rays(points, height, width)
     column = jnp.clip(jnp.floor(u).astype(jnp.int32), 0, width - 1)
@@ -27,7 +27,7 @@ def depth(panorama: Panorama, points: jax.Array) -> jax.Array:
 @jax.jit
 def on_observed(panorama: Panorama, points: jax.Array) -> jax.Array:
     """(...) bool: whether points (..., 3) lie on the surface that `panorama` shows, or before it."""
-    return depth(panorama, points) <= 1 + MARGIN
+    return relative_distance(panorama, points) <= 1 + _MARGIN
 
 
 @jax.jit
@@ -38,10 +38,10 @@ def hidden_distance(panorama: Panorama, origin: jax.Array, rays: jax.Array, gues
     crosses no hidden place within twice the guess: a guess that would stand in seen space is no guess.
     """
     # From half the guess to twice it, evenly in log distance; the guess itself is one of the places.
-    factors = 2.0 ** jnp.linspace(-1.0, 1.0, STEPS + 1)
+    factors = 2.0 ** jnp.linspace(-1.0, 1.0, _STEPS + 1)
 
     def cost(factor):
-        hidden = depth(panorama, origin + rays * (guess * factor)[..., None]) >= 1 - MARGIN
+        hidden = relative_distance(panorama, origin + rays * (guess * factor)[..., None]) >= 1 - _MARGIN
         return jnp.where(hidden, jnp.abs(jnp.log(factor)), jnp.inf)
 
     def nearest(best, factor):

@@ -2,8 +2,8 @@
 
 A direction is an azimuth in radians that turns right, as in conventions.py: azimuth a is (cos a, -sin a, 0).
 
-The law that the rest of this room stands on: a straight path of length travel(...) along its direction comes no nearer
-to any band point than `camera_radius + stop_buffer`, or than the origin itself is, where the origin is nearer.
+The law that all of explore/ stands on: a straight path of length travel(...) along its direction comes no nearer to
+any band point than `camera_radius + stop_buffer`, or than the origin itself is, where the origin is nearer.
 """
 
 import math
@@ -14,38 +14,41 @@ import jax.numpy as jnp
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.sphere import azimuths
+from rein3d_jax.settings import Settings, setting
 
 
 @dataclass(frozen=True)
-class ExploreConfig:
-    trajectories: int = 8  # tau
-    camera_radius: float = 0.2  # metres, r_c
-    stop_buffer: float = 0.2  # metres, b_s
-    step: float = 0.25  # metres between frames
-    max_frames: int = 41  # frames held per trajectory; the paper's clip length. What does not fit is counted
-    band: tuple[float, float] = (0.45, 0.55)  # rows looked at, as shares of the height
-    view_points: int = 4  # N_fps: evaluation viewpoints besides the origin
-    view_samples: int = 2000  # M: Monte Carlo candidates for them
-    narrow: float = 0.1  # metres; directions with less room than this hold no viewpoint
-    reach: float = math.inf  # metres that a path goes at most; a short one explores locally
-    least: float = 0.0  # share of the sphere that a path's end must reveal, or the path is left out
+class ExploreConfig(Settings):
+    """Exploration's settings: where a camera may go, and how far."""
+
+    trajectories: int = setting(8, "paths from the centre outwards, tau", within="[1, inf)")
+    camera_radius: float = setting(0.2, "room that the camera itself takes, r_c", within="[0, inf)", unit="metres")
+    stop_buffer: float = setting(0.2, "room left before a surface, b_s", within="[0, inf)", unit="metres")
+    step: float = setting(0.25, "way between frames", within="(0, inf)", unit="metres")
+    max_frames: int = setting(41, "frames that a path holds; those that do not fit are counted", within="[1, inf)")
+    band: tuple[float, float] = setting(
+        (0.45, 0.55), "rows that hold obstacles: from and to, as shares of the height", within="[0, 1]"
+    )
+    viewpoints: int = setting(4, "evaluation viewpoints besides the centre, N_fps", within="[0, inf)")
+    viewpoint_samples: int = setting(2000, "Monte Carlo candidates for them, M", within="[1, inf)")
+    min_viewpoint_travel: float = setting(
+        0.1, "directions in which the camera goes less far hold no viewpoint", within="[0, inf)", unit="metres"
+    )
+    max_length: float = setting(
+        math.inf, "length of a path at most; a short one explores locally", within="[0, inf]", unit="metres"
+    )
+    min_revealed: float = setting(
+        0.0, "share of the sphere that a path's end must reveal, or the path is left out", within="[0, 1)"
+    )
 
     def __post_init__(self):
-        if min(self.trajectories, self.max_frames, self.view_samples) < 1 or self.view_points < 0:
-            raise InputError("explore.trajectories, max_frames and view_samples must be at least 1, view_points 0")
-        if self.step <= 0:
-            raise InputError(f"explore.step {self.step} must be above 0 metres")
-        for name in ("camera_radius", "stop_buffer", "narrow", "reach"):
-            if getattr(self, name) < 0:
-                raise InputError(f"explore.{name} {getattr(self, name)} must not be below 0 metres")
-        if not 0 <= self.band[0] < self.band[1] <= 1:
-            raise InputError(f"explore.band {self.band} must be two shares of the height, the smaller first")
-        if not 0 <= self.least < 1:
-            raise InputError(f"explore.least {self.least} must be a share from 0 to below 1")
+        super().__post_init__()
+        if self.band[0] >= self.band[1]:
+            raise InputError(f"band {self.band} must be two shares of the height, the smaller first")
 
     @property
     def clearance(self) -> float:
-        """R = r_c + b_s, metres."""
+        """The clearance R = r_c + b_s, metres."""
         return self.camera_radius + self.stop_buffer
 
 
@@ -83,12 +86,12 @@ def safe_distances(profile: jax.Array, directions: jax.Array, *, config: Explore
     Half a column is added for the surface between column centres.
     """
     width = profile.shape[0]
-    turn = directions[:, None] - azimuths(width)
-    delta = jnp.abs(jnp.mod(turn + jnp.pi, 2 * jnp.pi) - jnp.pi)
+    angle = directions[:, None] - azimuths(width)
+    delta = jnp.abs(jnp.mod(angle + jnp.pi, 2 * jnp.pi) - jnp.pi)
     ratio = config.clearance / jnp.maximum(profile, jnp.finfo(profile.dtype).tiny)
     # 1 % more than half a column, so that rounding never leaves a direction between two columns with neither.
-    reach = jnp.arcsin(jnp.minimum(1.0, ratio)) + 1.01 * jnp.pi / width
-    return jnp.min(jnp.where(delta <= reach, profile, jnp.inf), axis=1)
+    half_width = jnp.arcsin(jnp.minimum(1.0, ratio)) + 1.01 * jnp.pi / width
+    return jnp.min(jnp.where(delta <= half_width, profile, jnp.inf), axis=1)
 
 
 def travel(safe: jax.Array, *, config: ExploreConfig) -> jax.Array:

@@ -55,9 +55,9 @@ def _radial_trajectories(panorama: Panorama, *, config: ExploreConfig = ExploreC
     rotation = _best_rotation(raw, config)
     directions = _fan(rotation, config.trajectories)
     free = travel(safe_distances(raw, directions, config=config), config=config)
-    # The longest reveals most, and what is guessed there is of one piece: it goes first (benchmarks/NOTES.md).
+    # The longest reveals most, and what is guessed there is of one piece: it goes first (benchmarks/README.md).
     order = jnp.argsort(-free, stable=True)
-    directions, lengths = directions[order], jnp.minimum(free[order], config.reach)
+    directions, lengths = directions[order], jnp.minimum(free[order], config.max_length)
     points = jnp.floor(lengths / config.step).astype(jnp.int32) + 1
     counts = jnp.minimum(points, config.max_frames)
     frames = jnp.minimum(jnp.arange(config.max_frames), counts[:, None] - 1)

@@ -8,7 +8,7 @@ from rein3d_jax.explore.profile import ExploreConfig, travel
 from rein3d_jax.geometry.poses import upright
 from rein3d_jax.geometry.sphere import azimuths, horizontal_direction
 
-YAWS = (0.0, 0.5 * jnp.pi, jnp.pi, 1.5 * jnp.pi)  # radians, turning left (Algorithm 2, line 25)
+_YAWS = (0.0, 0.5 * jnp.pi, jnp.pi, 1.5 * jnp.pi)  # radians, turning left (Algorithm 2, line 25)
 
 
 @struct.dataclass
@@ -24,10 +24,10 @@ def _candidates(key: jax.Array, safe: jax.Array, config: ExploreConfig) -> tuple
     """(m, 3) points and (m,) whether they count: r = R_max sqrt(u), uniform in area within a column's sector (lines
     2 to 11)."""
     column_key, radius_key = jax.random.split(key)
-    column = jax.random.randint(column_key, (config.view_samples,), 0, safe.shape[0])
+    column = jax.random.randint(column_key, (config.viewpoint_samples,), 0, safe.shape[0])
     usable = travel(safe, config=config)[column]
     radius = usable * jnp.sqrt(jax.random.uniform(radius_key, column.shape))
-    return radius[:, None] * horizontal_direction(azimuths(safe.shape[0])[column]), usable > config.narrow
+    return radius[:, None] * horizontal_direction(azimuths(safe.shape[0])[column]), usable > config.min_viewpoint_travel
 
 
 def _farthest_points(candidates: jax.Array, usable: jax.Array, count: int) -> tuple[jax.Array, jax.Array]:
@@ -45,15 +45,15 @@ def _farthest_points(candidates: jax.Array, usable: jax.Array, count: int) -> tu
 
 
 def _evaluation_viewpoints(key: jax.Array, safe: jax.Array, *, config: ExploreConfig = ExploreConfig()) -> Viewpoints:
-    """`config.view_points` + 1 level viewpoints, four yaws each, from the safe profile (w,) in metres of
+    """`config.viewpoints` + 1 level viewpoints, four yaws each, from the safe profile (w,) in metres of
     Trajectories.safe (Algorithm 2, whole). Without usable room only the origin is valid."""
-    points, valid = _farthest_points(*_candidates(key, safe, config), config.view_points)
+    points, valid = _farthest_points(*_candidates(key, safe, config), config.viewpoints)
     positions = jnp.concatenate([jnp.zeros((1, 3)), points])
     by_yaw = jax.vmap(upright, (None, 0))
     return Viewpoints(
         positions=positions,
         valid=jnp.concatenate([jnp.ones(1, bool), valid]),
-        world_from_camera=jax.vmap(by_yaw, (0, None))(positions, jnp.array(YAWS)),
+        world_from_camera=jax.vmap(by_yaw, (0, None))(positions, jnp.array(_YAWS)),
     )
 
 

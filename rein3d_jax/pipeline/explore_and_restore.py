@@ -52,7 +52,7 @@ def _explored(known: Survey, restore: Restorer, key: jax.Array, stages: Stages, 
     seen = before.scene if stages.restore.sequential else known.coarse
     end, raster = render_video(seen, poses[-1:], height, before.raster)
     revealed = 1 - jnp.mean(coverage(end.alpha))
-    if revealed < stages.explore.least:
+    if revealed < stages.explore.min_revealed:
         video, raster = render_video(seen, poses[:1], height, raster)
         after = before.replace(raster=raster)
     else:

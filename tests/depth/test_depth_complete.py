@@ -1,3 +1,5 @@
+"""What is known stays, what is not gets a finite distance."""
+
 import jax.numpy as jnp
 import numpy as np
 from hypothesis import given, settings

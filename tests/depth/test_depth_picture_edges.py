@@ -1,3 +1,5 @@
+"""Laws of edge support and of the colours that a split of the sphere explains."""
+
 import jax.numpy as jnp
 import numpy as np
 import pytest

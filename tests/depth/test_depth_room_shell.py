@@ -1,3 +1,5 @@
+"""A painted box is found again from its picture."""
+
 import dataclasses
 
 import jax
@@ -61,3 +63,20 @@ def test_a_camera_twice_as_high_sees_a_room_twice_as_large():
 def test_a_picture_without_edges_is_refused():
     with pytest.raises(InputError, match="distance map"):
         fit_room_shell(jnp.full((64, 128, 3), 0.5), config=CONFIG)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"camera_height": 0.0},
+        {"wall_range": (0.0, 5.0)},
+        {"wall_range": (5.0, 0.6)},
+        {"max_aspect": 0.5},
+        {"edge_weights": (0.0, 0.0, 0.0)},
+        {"noise": 0.0},
+        {"climbers": 0},
+    ],
+)
+def test_settings_that_no_room_fits_are_refused_by_name(bad):
+    with pytest.raises(InputError, match=f"^{next(iter(bad))} must"):
+        RoomShellConfig(**bad)

@@ -1,3 +1,5 @@
+"""Laws of a room's lines and parts as they are seen from inside."""
+
 import jax.numpy as jnp
 import numpy as np
 

@@ -4,14 +4,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from rein3d_jax.explore.hidden import MARGIN, STEPS, hidden_distance, on_observed
+from rein3d_jax.explore.hidden import _MARGIN, _STEPS, hidden_distance, on_observed
 from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.scene import Panorama
 
 HEIGHT, WIDTH = 16, 32
 RAYS = pixel_rays(HEIGHT, WIDTH)
 ORIGIN = jnp.array([0.5, -0.3, 0.1])
-STEP = 2 ** (2 / STEPS)  # from one tried place to the next
+STEP = 2 ** (2 / _STEPS)  # from one tried place to the next
 SHAPE = (HEIGHT, WIDTH)
 
 
@@ -28,12 +28,12 @@ def test_a_guess_in_seen_space_is_moved_just_behind_the_surface() -> None:
     """A ball of 2 m was seen. The guess lies 1.5 m from a camera within it."""
     moved = hidden_distance(seen_at(2.0), ORIGIN, RAYS, jnp.full(SHAPE, 1.5))
     reach = from_centre(moved)
-    assert np.all(reach >= 2 * (1 - MARGIN) - 1e-5)  # float32
+    assert np.all(reach >= 2 * (1 - _MARGIN) - 1e-5)  # float32
     before = from_centre(moved / STEP)
     stays = np.asarray(moved) == 1.5  # was behind it already
     assert 0 < stays.mean() < 1
-    np.testing.assert_array_equal(stays, from_centre(jnp.full(SHAPE, 1.5)) >= 2 * (1 - MARGIN))
-    assert np.all(before[~stays & (moved > 1.5)] < 2 * (1 - MARGIN) + 1e-5)  # the nearest one tried, no farther
+    np.testing.assert_array_equal(stays, from_centre(jnp.full(SHAPE, 1.5)) >= 2 * (1 - _MARGIN))
+    assert np.all(before[~stays & (moved > 1.5)] < 2 * (1 - _MARGIN) + 1e-5)  # the nearest one tried, no farther
 
 
 def test_a_hidden_guess_stays_to_the_bit() -> None:
@@ -48,7 +48,7 @@ def test_where_nothing_is_hidden_there_is_no_guess() -> None:
 def test_what_was_lifted_lies_on_what_was_observed_and_a_guess_behind_does_not() -> None:
     surface = jax.random.uniform(jax.random.key(2), SHAPE, minval=0.8, maxval=4.0)
     assert np.all(on_observed(seen_at(surface), RAYS * surface[..., None]))
-    assert not np.any(on_observed(seen_at(surface), RAYS * surface[..., None] * (1 + 2 * MARGIN)))
+    assert not np.any(on_observed(seen_at(surface), RAYS * surface[..., None] * (1 + 2 * _MARGIN)))
 
 
 def test_never_in_front_of_what_was_seen() -> None:
@@ -61,7 +61,7 @@ def test_never_in_front_of_what_was_seen() -> None:
     column = ((np.arctan2(-points[..., 1], points[..., 0]) / (2 * np.pi) + 0.5) * WIDTH).astype(int) % WIDTH
     reach = np.linalg.norm(points, axis=-1)
     row = np.clip((0.5 - np.arcsin(points[..., 2] / reach) / np.pi) * HEIGHT, 0, HEIGHT - 1).astype(int)
-    in_front = (moved > 0) & (reach < np.asarray(surface)[row, column] * (1 - MARGIN) - 1e-5)  # float32
+    in_front = (moved > 0) & (reach < np.asarray(surface)[row, column] * (1 - _MARGIN) - 1e-5)  # float32
     # A place within float32 of a pixel's border may be looked up on the other side of it here.
     assert in_front.sum() <= 1
     assert (moved > 0).mean() > 0.5

@@ -1,6 +1,5 @@
 """Laws of Algorithm 1."""
 
-import dataclasses
 from dataclasses import replace
 
 import jax
@@ -135,17 +134,17 @@ def test_any_number_of_trajectories(count: int) -> None:
     assert np.all(gap >= np.minimum(np.linalg.norm(points, axis=-1), CONFIG.clearance) - 1e-5)
 
 
-@pytest.mark.parametrize("reach", [0.0, 0.6, 100.0])
-def test_no_path_goes_beyond_its_reach_and_a_far_one_changes_nothing(reach: float) -> None:
+@pytest.mark.parametrize("length", [0.0, 0.6, 100.0])
+def test_no_path_is_longer_than_the_longest_allowed_and_a_far_limit_changes_nothing(length: float) -> None:
     free = radial_trajectories(panorama(random_profile(3)), config=CONFIG)
-    held = radial_trajectories(panorama(random_profile(3)), config=dataclasses.replace(CONFIG, reach=reach))
-    np.testing.assert_array_equal(held.lengths, np.minimum(free.lengths, np.float32(reach)))
+    held = radial_trajectories(panorama(random_profile(3)), config=replace(CONFIG, max_length=length))
+    np.testing.assert_array_equal(held.lengths, np.minimum(free.lengths, np.float32(length)))
     np.testing.assert_array_equal(held.directions, free.directions)
-    assert np.all(np.linalg.norm(np.asarray(held.positions), axis=-1) <= reach + 1e-6)  # float32 unit vectors
+    assert np.all(np.linalg.norm(np.asarray(held.positions), axis=-1) <= length + 1e-6)  # float32 unit vectors
 
 
 @pytest.mark.parametrize(
-    "bad", [{"trajectories": 0}, {"step": 0.0}, {"reach": -1.0}, {"band": (0.6, 0.4)}, {"least": 1.0}]
+    "bad", [{"trajectories": 0}, {"step": 0.0}, {"max_length": -1.0}, {"band": (0.6, 0.4)}, {"min_revealed": 1.0}]
 )
 def test_bad_settings_are_refused_by_name(bad: dict) -> None:
     with pytest.raises(InputError, match=next(iter(bad))):

@@ -13,7 +13,7 @@ from rein3d_jax.explore.profile import ExploreConfig, travel
 from rein3d_jax.explore.viewpoints import _candidates, evaluation_viewpoints
 
 WIDTH = 16
-CONFIG = ExploreConfig(view_samples=300)
+CONFIG = ExploreConfig(viewpoint_samples=300)
 
 
 def polar(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -32,10 +32,11 @@ def test_points_are_distinct_and_inside_the_usable_area(seed: int, high: float) 
     positions, valid = np.asarray(views.positions), np.asarray(views.valid)
     assert valid[0]
     assert np.all(positions[0] == 0)
-    assert valid[1:].all() == (usable > CONFIG.narrow).any()  # 300 candidates do not run out, unless there are none
+    # 300 candidates do not run out, unless there are none.
+    assert valid[1:].all() == (usable > CONFIG.min_viewpoint_travel).any()
     radius, column = polar(positions[valid])
     assert np.all(radius[1:] <= usable[column[1:]] + 1e-5)  # float32 metres
-    assert np.all(usable[column[1:]] > CONFIG.narrow)
+    assert np.all(usable[column[1:]] > CONFIG.min_viewpoint_travel)
     assert len(np.unique(positions[valid], axis=0)) == valid.sum()
     assert np.all(positions[:, 2] == 0)
 
@@ -47,7 +48,7 @@ def test_each_point_is_the_farthest_from_those_before() -> None:
     views = evaluation_viewpoints(key, safe, config=CONFIG)
     points, usable = map(np.asarray, _candidates(key, safe, CONFIG))
     points, taken = points[usable], [np.zeros(3)]
-    for _ in range(CONFIG.view_points):
+    for _ in range(CONFIG.viewpoints):
         nearest = [min(np.linalg.norm(point - other) for other in taken) for point in points]
         taken.append(points[int(np.argmax(nearest))])
     np.testing.assert_allclose(views.positions, taken, atol=1e-6)  # one jit, one not
@@ -55,7 +56,7 @@ def test_each_point_is_the_farthest_from_those_before() -> None:
 
 def test_candidates_are_uniform_in_area_within_a_sector() -> None:
     """Half of a sector's area lies within R / sqrt(2): so do half of the samples."""
-    config = replace(CONFIG, view_samples=20000)
+    config = replace(CONFIG, viewpoint_samples=20000)
     points, _ = _candidates(jax.random.key(0), jnp.full(WIDTH, 2.4), config)
     radius, column = polar(np.asarray(points))
     assert np.mean(radius < 2 / np.sqrt(2)) == pytest.approx(0.5, abs=0.015)  # four standard errors of 20000
@@ -71,7 +72,7 @@ def test_without_room_only_the_origin_counts(level: float) -> None:
 
 
 def test_candidates_that_run_out_are_not_repeated() -> None:
-    views = evaluation_viewpoints(jax.random.key(0), jnp.full(WIDTH, 3.0), config=replace(CONFIG, view_samples=2))
+    views = evaluation_viewpoints(jax.random.key(0), jnp.full(WIDTH, 3.0), config=replace(CONFIG, viewpoint_samples=2))
     np.testing.assert_array_equal(views.valid, [True, True, True, False, False])
 
 

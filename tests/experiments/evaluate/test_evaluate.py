@@ -18,7 +18,7 @@ height = 64
 height = 32
 [explore]
 trajectories = 2
-view_points = 1
+viewpoints = 1
 """
 METHODS = "coarse,telea,mesh_warp"
 
