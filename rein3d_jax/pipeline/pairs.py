@@ -13,32 +13,34 @@ from rein3d_jax.depth.complete import CompleteConfig, complete_distance
 from rein3d_jax.errors import InputError
 from rein3d_jax.explore.chord import Chord, longest_chord
 from rein3d_jax.explore.profile import ExploreConfig
-from rein3d_jax.geometry.poses import equirectangular_camera, rigid
+from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.geometry.safe import safe_divide
-from rein3d_jax.geometry.sphere import world_from_camera_axes
 from rein3d_jax.lift import LiftConfig, lift
+from rein3d_jax.pipeline.stages import level_pose
 from rein3d_jax.rasterize import RasterizeConfig, enlarge, rasterize
 from rein3d_jax.rooms.config import RoomConfig
 from rein3d_jax.rooms.generate import generate_room
 from rein3d_jax.rooms.tracing.trace import trace
 from rein3d_jax.scene import Pair, Panorama, Video
+from rein3d_jax.settings import Settings, setting
 
-SCOUT = 64  # rows of the panorama by which a room's path is found
 ATTEMPTS = 200  # rooms drawn for one that has the path
+_SCOUT_ROWS = 64  # of the panorama by which a room's path is found
 
-Look = Callable[[jax.Array, int], tuple]  # pose (4, 4), rows -> rgb (h, w, 3), distance (h, w), 0 where nothing is hit
+# pose (4, 4), rows -> rgb (h, w, 3), distance (h, w), 0 where nothing is hit
+PanoramaTracer = Callable[[jax.Array, int], tuple]
 
 
 @dataclasses.dataclass(frozen=True)
-class PairConfig:
-    """What a clip is."""
+class PairConfig(Settings):
+    """A clip of a pair: its frames, and what its degraded twin is made with."""
 
-    height: int = 128  # rows of its frames
-    source_height: int = 0  # rows of the first panorama as it is lifted; 0 = height
-    frames: int = 17  # the paper's clips have 41
-    speed: float = 1.0  # metres a second
-    rate: float = 10.0  # frames a second
-    samples: int = 1  # rays a pixel and side of a room's frames
+    height: int = setting(128, "of its frames, a multiple of rasterize.tile", within="[8, inf)", unit="rows")
+    source_height: int = setting(0, "of the first panorama as it is lifted; 0: height", within="[0, inf)", unit="rows")
+    frames: int = setting(17, "of a clip; the paper's have 41", within="[2, inf)")
+    speed: float = setting(1.0, "of the camera", within="(0, inf)", unit="metres a second")
+    rate: float = setting(10.0, "of the clip", within="(0, inf)", unit="frames a second")
+    samples: int = setting(1, "rays a pixel and side of a room's frames", within="[1, inf)")
     explore: ExploreConfig = ExploreConfig()  # how much clearance a path keeps
     lift: LiftConfig = LiftConfig()
     depth: CompleteConfig = CompleteConfig()  # where what shows through windows is placed, as in the main job
@@ -46,14 +48,11 @@ class PairConfig:
     rooms: RoomConfig = RoomConfig()
 
     def __post_init__(self):
-        if self.height % self.rasterize.tile or self.height < 8:
-            raise InputError(f"height {self.height} must be a multiple of rasterize.tile {self.rasterize.tile}")
+        super().__post_init__()
+        if self.height % self.rasterize.tile:
+            raise InputError(f"height must be a multiple of rasterize.tile {self.rasterize.tile}, not {self.height}")
         if self.source_rows % 2 or self.source_rows < 8:
-            raise InputError(f"source_height {self.source_height} must be even and at least 8, or 0")
-        if self.frames < 2 or self.samples < 1:
-            raise InputError("frames must be at least 2 and samples at least 1: a clip is a walk")
-        if not (self.speed > 0 and self.rate > 0):
-            raise InputError("speed and rate must be above 0: a path of no length shows nothing new")
+            raise InputError(f"source_height must be even and at least 8, or 0, not {self.source_height}")
 
     @property
     def length(self) -> float:
@@ -82,13 +81,13 @@ def room_pair(key: jax.Array, config: PairConfig) -> Drawn:
     Pure; for jit (config static) and vmap over keys. The caller checks `length >= config.length`, and that `needed`
     fits config.rasterize.buffers (`with_buffers` sets them); else frames miss splats.
     """
-    draw_key, walk_key = jax.random.split(key)
+    draw_key, path_key = jax.random.split(key)
 
     def draw(state):
         """The next room, and its longest path."""
         draws, _, _ = state
         place = generate_room(jax.random.fold_in(draw_key, draws), config.rooms)
-        distance = trace(place, _pose(jnp.zeros(3)), SCOUT).distance
+        distance = trace(place, level_pose(jnp.zeros(3)), _SCOUT_ROWS).distance
         return draws + 1, place, longest_chord(distance, distance > 0, config=config.explore)
 
     def too_short(state):
@@ -97,13 +96,13 @@ def room_pair(key: jax.Array, config: PairConfig) -> Drawn:
 
     blank = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), jax.eval_shape(draw, (jnp.int32(0), None, None)))
     draws, place, path = jax.lax.while_loop(too_short, draw, blank)
-    offsets, start = walk(walk_key, path, config)
-    clean = trace(place, _pose(start + offsets), config.height, samples=config.samples)
+    offsets, start = clip_places(path_key, path, config)
+    clean = trace(place, level_pose(start + offsets), config.height, samples=config.samples)
     source = clean.rgb[0], clean.distance[0]
     if (config.source_rows, config.samples) != (config.height, 1):
-        apart = trace(place, _pose(start), config.source_rows)
+        apart = trace(place, level_pose(start), config.source_rows)
         source = apart.rgb, apart.distance
-    degraded, needed = _degraded(Panorama(*source, source[1] > 0), _pose(offsets), config)
+    degraded, needed = _degraded(Panorama(*source, source[1] > 0), level_pose(offsets), config)
     return Drawn(Pair(_clean(clean.rgb, clean.distance, offsets), degraded), path.length, draws, needed)
 
 
@@ -122,23 +121,23 @@ def make_pair(key: jax.Array, config: PairConfig) -> Drawn:
         config = more
 
 
-def scene_pair(key: jax.Array, look: Look, config: PairConfig) -> Drawn:
-    """The pair of any place that `look` can trace, from where its origin stands.
+def scene_pair(key: jax.Array, render: PanoramaTracer, config: PairConfig) -> Drawn:
+    """The pair of any place that `render` traces, from where its origin stands.
 
     Raises InputError where its longest path is shorter than the config's, a path of no length included."""
-    _, walk_key = jax.random.split(key)
-    distance = jnp.asarray(look(_pose(jnp.zeros(3)), SCOUT)[1])
+    _, path_key = jax.random.split(key)
+    distance = jnp.asarray(render(level_pose(jnp.zeros(3)), _SCOUT_ROWS)[1])
     chord = longest_chord(distance, distance > 0, config=config.explore)
     if float(chord.length) < config.length:
         raise InputError(
             f"the longest straight path through its origin has {chord.length:.2f} m, and a clip walks "
             f"{config.length:g} m: lower frames or speed or explore's clearance, or leave the scene out"
         )
-    offsets, start = walk(walk_key, chord, config)
-    source = Panorama(*_seen(look, start, config.source_rows))
-    frames = [_seen(look, start + offset, config.height) for offset in offsets]
+    offsets, start = clip_places(path_key, chord, config)
+    source = Panorama(*_seen(render, start, config.source_rows))
+    frames = [_seen(render, start + offset, config.height) for offset in offsets]
     rgb, distance, _ = (jnp.stack(part) for part in zip(*frames, strict=True))
-    degraded, needed = _fitting(source, _pose(offsets), config)
+    degraded, needed = _fitting(source, level_pose(offsets), config)
     return Drawn(Pair(_clean(rgb, distance, offsets), degraded), chord.length, jnp.int32(1), needed)
 
 
@@ -148,7 +147,7 @@ def degrade(panorama: Panorama, world_from_camera: jax.Array, *, config: PairCon
     return _fitting(panorama, world_from_camera, config)[0]
 
 
-def walk(key: jax.Array, path: Chord, config: PairConfig) -> tuple[jax.Array, jax.Array]:
+def clip_places(key: jax.Array, path: Chord, config: PairConfig) -> tuple[jax.Array, jax.Array]:
     """Places (t, 3) relative to the first, and the first (3,): a piece of the path drawn by `key`, either way along."""
     where, way = jax.random.split(key)
     begin = jax.random.uniform(where) * jnp.maximum(path.length - config.length, 0.0)
@@ -163,14 +162,14 @@ def _degraded(panorama: Panorama, poses: jax.Array, config: PairConfig) -> tuple
     distance = complete_distance(panorama.distance, panorama.valid, config=config.depth)
     everywhere = jnp.ones(panorama.valid.shape, bool)
     placed = Panorama(panorama.rgb, distance, everywhere)  # what has no distance has a colour
-    scene = lift(placed, _pose(jnp.zeros(3)), everywhere, config=config.lift)
+    scene = lift(placed, level_pose(jnp.zeros(3)), everywhere, config=config.lift)
 
-    def look(pose):
+    def frame_at(pose):
         frame = rasterize(scene, equirectangular_camera(pose, config.height), config=config.rasterize)
         rgb = safe_divide(frame.rgb, frame.alpha[..., None])
         return jnp.clip(rgb, 0, 1), frame.alpha, frame.distance, frame.needed
 
-    rgb, alpha, distance, needed = jax.lax.map(look, poses)
+    rgb, alpha, distance, needed = jax.lax.map(frame_at, poses)
     return Video(rgb, alpha, distance, poses), needed.max(axis=0)
 
 
@@ -183,19 +182,14 @@ def _fitting(panorama: Panorama, poses: jax.Array, config: PairConfig) -> tuple[
         config = more
 
 
-def _seen(look: Look, position: jax.Array, rows: int) -> tuple[jax.Array, jax.Array, jax.Array]:
+def _seen(render: PanoramaTracer, position: jax.Array, rows: int) -> tuple[jax.Array, jax.Array, jax.Array]:
     """Colour, distance, and where the distance is known."""
-    rgb, distance = (jnp.asarray(x) for x in look(_pose(position), rows))
+    rgb, distance = (jnp.asarray(x) for x in render(level_pose(position), rows))
     return rgb, distance, distance > 0
 
 
 def _clean(rgb: jax.Array, distance: jax.Array, offsets: jax.Array) -> Video:
-    return Video(rgb, jnp.ones(distance.shape), distance, _pose(offsets))
-
-
-def _pose(position: jax.Array) -> jax.Array:
-    """(..., 4, 4) of a panorama at (..., 3) that looks along +X."""
-    return rigid(jnp.broadcast_to(world_from_camera_axes(), (*position.shape[:-1], 3, 3)), position)
+    return Video(rgb, jnp.ones(distance.shape), distance, level_pose(offsets))
 
 
 def with_buffers(config: PairConfig) -> PairConfig:

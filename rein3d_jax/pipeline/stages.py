@@ -31,9 +31,14 @@ class Stages(Settings):
     refine: RefineConfig = RefineConfig()
 
 
+def level_pose(position: jax.Array) -> jax.Array:
+    """world_from_camera (..., 4, 4) of a panorama at (..., 3) metres that is oriented as the input is: along +X."""
+    return rigid(jnp.broadcast_to(world_from_camera_axes(), (*position.shape[:-1], 3, 3)), position)
+
+
 def origin_pose() -> jax.Array:
     """world_from_camera (4, 4) of the input panorama."""
-    return rigid(world_from_camera_axes(), jnp.zeros(3))
+    return level_pose(jnp.zeros(3))
 
 
 def render_video(gaussians: Gaussians, poses: jax.Array, height: int, raster: RasterizeConfig):

@@ -117,11 +117,11 @@ def test_a_scene_without_a_path_is_refused(length):
         )
 
 
-def test_a_walk_lies_within_the_path_and_goes_either_way():
+def test_a_clip_lies_within_the_path_and_goes_either_way():
     path = pairs.Chord(jnp.array([-2.0, 0, 0]), jnp.array([1.0, 0, 0]), jnp.float32(5.0))
     ends = []
     for seed in range(20):
-        offsets, start = pairs.walk(jax.random.key(seed), path, CONFIG)
+        offsets, start = pairs.clip_places(jax.random.key(seed), path, CONFIG)
         places = start + offsets
         assert float(places[:, 0].min()) >= -2 - 1e-6 and float(places[:, 0].max()) <= 3 + 1e-6
         ends.append(float(offsets[-1, 0]))
