@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from experiments.command_list import commands
+from rein3d_jax import __version__
 
 ROOT = Path(__file__).resolve().parents[1]
 CARD = ROOT / "README.md"  # the owner's card: for the person with a photo
@@ -79,6 +80,10 @@ def test_what_a_paper_names_exists(paper):
     assert not missing_files(paper, text)
     assert not missing_commands(text)
     assert not outside(text)
+
+
+def test_the_citation_is_of_this_version():
+    assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text("utf-8")
 
 
 def test_the_checks_tell_right_from_wrong():
