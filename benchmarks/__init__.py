@@ -1,1 +1,1 @@
-"""Side-by-side measurements: `python -m benchmarks NAME`; results are kept in results/, what lost stands in README.md."""
+"""Side-by-side measurements, `python -m benchmarks NAME`: figures in results/, what lost in README.md."""

@@ -45,12 +45,12 @@ def mirrored(points: jax.Array, face: jax.Array, rays: jax.Array) -> jax.Array:
 
 
 def pose_at(place) -> jax.Array:
-    """world_from_camera of an unturned panorama."""
+    """world_from_camera of an upright panorama at yaw 0."""
     return rigid(world_from_camera_axes(), jnp.asarray(place, jnp.float32))
 
 
-def look(place, paint: Paint) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """(rgb, distance, face) of the box from `place`: the truth."""
+def true_panorama(place, paint: Paint) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """True (rgb, distance, face) of the box from `place`."""
     rays = rays_of_pose(pose_at(place), HEIGHT, 2 * HEIGHT)
     distance, face = meet_shell(BOX, jnp.asarray(place, jnp.float32), rays)
     return paint(jnp.asarray(place) + distance[..., None] * rays, face, rays), distance, face
@@ -58,7 +58,7 @@ def look(place, paint: Paint) -> tuple[jax.Array, jax.Array, jax.Array]:
 
 def lifted(paint: Paint, *, unit: float = 1.0, spare: float = 1.0, noise: float = 0.0) -> Gaussians:
     """The box as it is from the origin, in `unit`s of length, distances off by a share of `noise`."""
-    rgb, distance, _ = look(np.zeros(3), paint)
+    rgb, distance, _ = true_panorama(np.zeros(3), paint)
     distance *= unit * jnp.exp(noise * jax.random.normal(jax.random.key(0), distance.shape))
     everywhere = jnp.ones(distance.shape, bool)
     scene = lift(Panorama(rgb, distance, everywhere), pose_at(np.zeros(3)), everywhere, config=LiftConfig())
@@ -68,11 +68,11 @@ def lifted(paint: Paint, *, unit: float = 1.0, spare: float = 1.0, noise: float 
 def views_of(
     paint: Paint, config: ViewsConfig, *, unit: float = 1.0, tint=lambda source: 0.0, weight=lambda source: 1.0
 ) -> Views:
-    """Of the box from the origin (source 0) and from PLACES (sources 1 and 2 by turns)."""
+    """Of the box from the origin (source 0) and from PLACES (sources 1 and 2 alternately)."""
     parts = []
     for index, place in enumerate([np.zeros(3), *PLACES]):
         source = 0 if index == 0 else 1 + index % 2
-        rgb, distance, _ = look(place, paint)
+        rgb, distance, _ = true_panorama(place, paint)
         frame = (rgb + tint(source), weight(source) * jnp.ones_like(distance), pose_at(unit * place))
         parts.append(views_from_panorama(*frame, yaw=0.3 * index, config=config))
     return join_views(*parts)

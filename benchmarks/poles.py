@@ -1,4 +1,4 @@
-"""A splat's footprint on a panorama against Monte Carlo, from the horizon to the pole, beside plain EWA.
+"""Errors of a splat's footprint on a panorama against Monte Carlo, from the horizon to the pole, beside plain EWA.
 
 The footprint is measured where a user sees it: second moments of the rendered alpha over the sphere. Plain EWA is the
 affine approximation in longitude and latitude, with which many panoramic splatters draw: its ellipse in pixels, drawn
@@ -7,13 +7,16 @@ exactly. Truth is the distribution of the Gaussian's own points, seen from the c
 
 import io
 import json
+import sys
 from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
 
+from experiments.command import CommandParser
 from rein3d_jax.conventions import ALPHA_CUT
 from rein3d_jax.geometry.poses import equirectangular_camera, upright
+from rein3d_jax.geometry.rotations import quats_from_matrix
 from rein3d_jax.geometry.sphere import pixel_rays, pixel_solid_angles
 from rein3d_jax.io.files.atomic import write_bytes, write_text
 from rein3d_jax.rasterize import RasterizeConfig, allocate, rasterize
@@ -70,8 +73,8 @@ def footprint_errors(latitude: float, sigma: float, seed: int = 0) -> dict:
     plain = _plain_ewa(np.radians(latitude), axes, height).ravel() * area
     pixel = 0.3 * (np.pi / height) ** 2 * np.eye(2)
     cut = 1 - ALPHA_CUT / OPACITY * (1 + np.log(OPACITY / ALPHA_CUT))  # second moment of a Gaussian up to the cut
-    kept = cut / (1 - ALPHA_CUT / OPACITY)
-    truth = (_moments(truth_rays, np.ones(SAMPLES), frame) + pixel) * kept
+    share = cut / (1 - ALPHA_CUT / OPACITY)
+    truth = (_moments(truth_rays, np.ones(SAMPLES), frame) + pixel) * share
     return {
         "latitude": latitude,
         "sigma": sigma,
@@ -87,7 +90,7 @@ def _ours(frame, axes, height):
     scene = Gaussians(
         jnp.asarray(frame[:1], jnp.float32),
         jnp.log(jnp.asarray(axes[None], jnp.float32)),
-        jnp.asarray(_quaternion(rotation)[None], jnp.float32),
+        jnp.asarray(quats_from_matrix(rotation)[None], jnp.float32),
         jnp.full(1, np.log(OPACITY / (1 - OPACITY)), jnp.float32),
         jnp.zeros((1, 1, 3)),
         jnp.ones(1, bool),
@@ -95,19 +98,6 @@ def _ours(frame, axes, height):
     camera = equirectangular_camera(upright(jnp.zeros(3)), height)
     config = allocate(scene, [camera], config=RasterizeConfig(antialias=False, distance=False))
     return np.asarray(rasterize(scene, camera, config=config).alpha, np.float64)
-
-
-def _quaternion(matrix):
-    """wxyz of a rotation matrix, by its largest component (Shepperd)."""
-    m = matrix
-    products = np.array([
-        [1 + m[0, 0] + m[1, 1] + m[2, 2], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
-        [m[2, 1] - m[1, 2], 1 + m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]],
-        [m[0, 2] - m[2, 0], m[0, 1] + m[1, 0], 1 - m[0, 0] + m[1, 1] - m[2, 2], m[1, 2] + m[2, 1]],
-        [m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], 1 - m[0, 0] - m[1, 1] + m[2, 2]],
-    ])  # fmt: skip
-    row = products[np.argmax(np.diag(products))]
-    return row / np.linalg.norm(row)
 
 
 def _plain_ewa(latitude, axes, height):
@@ -143,8 +133,15 @@ def _chart(rows, path):
     write_bytes(Path(path), buffer.getvalue())
 
 
-def main(options) -> int:
-    """`python -m benchmarks poles`."""
+def main(arguments: list[str] | None = None) -> int:
+    """Prints the errors by latitude and size."""
+    parser = CommandParser("poles", __doc__, "benchmarks")
+    parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    parser.add_argument("--chart", metavar="PNG", help="draw the errors there")
+    return parser.run(_run, arguments)
+
+
+def _run(options) -> None:
     rows = [footprint_errors(latitude, sigma) for latitude in LATITUDES for sigma in SIGMAS]
     for key in ("ours", "plain_ewa"):
         print(f"{key}: error of second moments, by sigma / distance {SIGMAS}")
@@ -154,4 +151,7 @@ def main(options) -> int:
         write_text(Path(options.json), json.dumps(rows, indent=1) + "\n")
     if options.chart:
         _chart(rows, options.chart)
-    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,4 +1,6 @@
-"""Our rasterizer beside its peers: every engine in its own process, taking turns in one run.
+"""Seconds of our rasterizer beside its peers.
+
+Every engine runs in its own process, one after another in each round.
 
 Peers: the prototype that the project began with, re-made from its description, and gsplat's torch reference, as it is
 and with its slowest part, a Python loop, replaced. PyPI has
@@ -8,14 +10,17 @@ no pure-JAX splatting package that runs on a CPU (splax 0.2.3 needs CUDA: its ke
 import importlib.util
 import json
 import statistics
+import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from benchmarks.engines.worker import ENGINES, INSTALL, Worker
 from benchmarks.workloads import SIZES
+from experiments.command import CommandParser
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
 
-ENOUGH = 0.3  # seconds of one engine's turn; short calls repeat
+ENOUGH = 0.3  # seconds of one engine in a round; short calls repeat
 
 
 def measure(names: list[str], engines: list[str], rounds: int) -> dict:
@@ -38,7 +43,7 @@ def _one_workload(name, engines, rounds):
     for _ in range(rounds):
         for what in ("forward", "gradient"):
             for engine, worker in workers.items():
-                times[engine, what].append(turn(worker, what))
+                times[engine, what].append(timed_calls(worker, what))
     parts = {engine: _shares(worker) for engine, worker in workers.items()}
     rows = [_row(name, engine, worker, times, parts[engine]) for engine, worker in workers.items()]
     ours = "rein3d_jax"
@@ -48,8 +53,8 @@ def _one_workload(name, engines, rounds):
     return rows, ratios
 
 
-def turn(worker: Worker, what: str) -> tuple[float, float]:
-    """Median (wall, CPU) seconds of one engine's turn, after a warm-up call."""
+def timed_calls(worker: Worker, what: str) -> tuple[float, float]:
+    """Median (wall, CPU) seconds of one engine in a round, after a warm-up call."""
     first = worker.ask(what)[0][0]
     samples = worker.ask(what, max(1, min(15, int(ENOUGH / first))))
     return tuple(statistics.median(column) for column in zip(*samples, strict=True))
@@ -98,17 +103,40 @@ def table(result: dict) -> str:
     return "\n".join(lines + [f"{name} skipped: {how}" for name, how in result["skipped"].items()])
 
 
-def main(options) -> int:
-    """`python -m benchmarks rasterize`."""
-    names, engines = options.workloads.split(","), options.engines.split(",")
-    for given, known, option in ((engines, ENGINES, "engines"), (names, SIZES, "workloads")):
-        for name in given:
-            if name not in known:
-                raise InputError(f"--{option} {name} is none of {', '.join(known)}")
+def names_among(known: Iterable[str], text: str, option: str) -> list[str]:
+    """The comma-separated names in `text`. Raises InputError for one that is not `known`."""
+    names = text.split(",")
+    for name in names:
+        if name not in known:
+            raise InputError(f"--{option} {name} is none of {', '.join(known)}")
+    return names
+
+
+def add_rounds(parser: CommandParser) -> None:
+    """--workloads, --rounds and --json."""
+    parser.add_argument("--workloads", default=",".join(SIZES), metavar="A,B", help="default: all of %(default)s")
+    parser.add_argument("--rounds", type=int, default=5, metavar="N", help="(default: %(default)s)")
+    parser.add_argument("--json", metavar="FILE", help="write the figures there")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Exit code 0, or 2 with one line on stderr where an argument is at fault."""
+    parser = CommandParser("rasterize", __doc__, "benchmarks")
+    add_rounds(parser)
+    parser.add_argument("--engines", default=",".join(ENGINES), metavar="A,B", help="default: all of %(default)s")
+    return parser.run(_run, arguments)
+
+
+def _run(options) -> None:
+    names = names_among(SIZES, options.workloads, "workloads")
+    engines = names_among(ENGINES, options.engines, "engines")
     if options.rounds < 1:
-        raise InputError("--rounds must be at least 1")
+        raise InputError(f"--rounds {options.rounds} must be at least 1")
     result = measure(names, engines, options.rounds)
     print(table(result))
     if options.json:
         write_text(Path(options.json), json.dumps(result, indent=1) + "\n")
-    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,16 +1,19 @@
-"""A refinement step beside its peers: forward, gradient of the mean squared error, and Adam's update of every leaf.
+"""Seconds and bytes of a refinement step beside its peers.
 
-Each engine in its own process, taking turns in one run. Memory counts what compilation took.
+A step is the forward pass, the gradient of the mean squared error, and Adam's update of every leaf. Every engine runs
+in its own process, one after another in each round. Memory counts what compilation took.
 """
 
 import importlib.util
 import json
 import statistics
+import sys
 from pathlib import Path
 
 from benchmarks.engines.worker import INSTALL, Worker
-from benchmarks.rasterize import turn
+from benchmarks.rasterize import add_rounds, names_among, timed_calls
 from benchmarks.workloads import SIZES
+from experiments.command import CommandParser
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
 
@@ -27,7 +30,7 @@ def measure(names: list[str], rounds: int) -> list[dict]:
         times = {engine: [] for engine in workers}
         for _ in range(rounds):
             for engine, worker in workers.items():
-                times[engine].append(turn(worker, "step"))
+                times[engine].append(timed_calls(worker, "step"))
         grown = {engine: worker.close() / SIZES[name].count for engine, worker in workers.items()}
         rows += [_row(name, engine, times, grown) for engine in workers]
     return rows
@@ -44,14 +47,17 @@ def _row(name: str, engine: str, times: dict, grown: dict) -> dict:
             "bytes_ratio": grown[engine] / grown[OURS]}  # fmt: skip
 
 
-def main(options) -> int:
-    """`python -m benchmarks refine_step`."""
-    names = options.workloads.split(",")
-    for name in names:
-        if name not in SIZES:
-            raise InputError(f"--workloads {name} is none of {', '.join(SIZES)}")
+def main(arguments: list[str] | None = None) -> int:
+    """Exit code 0, or 2 with one line on stderr where an argument is at fault."""
+    parser = CommandParser("refine_step", __doc__, "benchmarks")
+    add_rounds(parser)
+    return parser.run(_run, arguments)
+
+
+def _run(options) -> None:
+    names = names_among(SIZES, options.workloads, "workloads")
     if options.rounds < 1:
-        raise InputError("--rounds must be at least 1")
+        raise InputError(f"--rounds {options.rounds} must be at least 1")
     if not all(importlib.util.find_spec(package) for package in ("torch", "gsplat")):
         raise InputError(f"refine_step needs torch and gsplat: {INSTALL[PEERS[0]]}")
     rows = measure(names, options.rounds)
@@ -60,4 +66,7 @@ def main(options) -> int:
               f"  {row['bytes_per_gaussian']:8.0f} bytes a Gaussian")  # fmt: skip
     if options.json:
         write_text(Path(options.json), json.dumps(rows, indent=1) + "\n")
-    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

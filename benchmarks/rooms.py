@@ -1,10 +1,10 @@
-"""Panoramas a second that rein3d_jax.rooms traces: `python -m benchmarks.rooms [--json FILE]`.
+"""Panoramas a second that rein3d_jax.rooms traces.
 
 For each of several rooms, frames along a short path, compiled once and warm; compile seconds apart."""
 
-import argparse
 import json
 import os
+import sys
 import time
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from experiments.command import CommandParser
 from rein3d_jax.geometry.poses import rigid
 from rein3d_jax.geometry.sphere import world_from_camera_axes
 from rein3d_jax.rooms.config import RoomConfig
@@ -20,18 +21,20 @@ from rein3d_jax.rooms.tracing.trace import trace
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Prints one line a room and the median; --json FILE writes the same."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.rooms", description=__doc__)
+    """Prints a line a room and the median."""
+    parser = CommandParser("rooms", __doc__, "benchmarks")
     parser.add_argument("--height", type=int, default=128, help="rows of a panorama (%(default)s)")
     parser.add_argument("--frames", type=int, default=16, help="frames a room (%(default)s)")
     parser.add_argument("--samples", type=int, default=1, help="rays a pixel, per side (%(default)s)")
     parser.add_argument("--rooms", type=int, default=8, help="rooms (%(default)s)")
-    parser.add_argument("--json", type=Path, help="file for the figures")
-    options = parser.parse_args(arguments)
+    parser.add_argument("--json", metavar="FILE", type=Path, help="write the figures there")
+    return parser.run(_run, arguments)
+
+
+def _run(options) -> None:
     figures = measure(options.height, options.frames, options.samples, options.rooms)
     if options.json:
-        options.json.write_text(json.dumps(figures, indent=1))
-    return 0
+        options.json.write_text(json.dumps(figures, indent=1) + "\n")
 
 
 def measure(height: int, frames: int, samples: int, rooms: int) -> dict:
@@ -73,4 +76,4 @@ def _seconds(function, *arguments) -> float:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    sys.exit(main())

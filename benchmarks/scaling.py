@@ -1,7 +1,8 @@
-"""How the rasterizer's time grows with Gaussians, with pixels, and from a pinhole camera to a panorama."""
+"""Growth of the rasterizer's time with Gaussians, with pixels, and from a pinhole camera to a panorama."""
 
 import json
 import statistics
+import sys
 import time
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from benchmarks.engines.ours import CONFIG, camera_of, scene_of
 from benchmarks.workloads import Size, make_workload
+from experiments.command import CommandParser
 from rein3d_jax.geometry.poses import equirectangular_camera, upright
 from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.io.files.atomic import write_text
@@ -92,8 +94,14 @@ def panorama_against_pinhole() -> dict:
     }
 
 
-def main(options) -> int:
-    """`python -m benchmarks scaling`."""
+def main(arguments: list[str] | None = None) -> int:
+    """Prints the slopes and the ratio."""
+    parser = CommandParser("scaling", __doc__, "benchmarks")
+    parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    return parser.run(_run, arguments)
+
+
+def _run(options) -> None:
     result = {"by_gaussians": by_gaussians(), "by_pixels": by_pixels(), "panorama": panorama_against_pinhole()}
     for name in ("by_gaussians", "by_pixels"):
         part = result[name]
@@ -105,4 +113,7 @@ def main(options) -> int:
     print(f"panorama {milliseconds[0]}, pinhole {milliseconds[1]}: {part['ratio']:.2f} x")
     if options.json:
         write_text(Path(options.json), json.dumps(result, indent=1) + "\n")
-    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,11 +1,13 @@
-"""Where methods of this kind fail as figures: tiny box rooms in closed form, seen
-from the origin and from places around it, lifted and refined. A row is a regime; no figure is tuned to look well.
+"""Figures of where methods of this kind fail, each a regime of its own.
 
-    python -m benchmarks.stability --json benchmarks/results/stability.json
+    python -m benchmarks.stability [--rows 7,9] [--json benchmarks/results/stability.json]
+
+Tiny box rooms in closed form are seen from the origin and from places around it, lifted and refined. No figure is tuned
+to look well. Rows are numbered as in the list of failures that they were drawn up from.
 """
 
-import argparse
 import json
+import sys
 import time
 from collections import deque
 from dataclasses import asdict, replace
@@ -15,7 +17,20 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from benchmarks.box_room import BOX, HEIGHT, MIRROR, Paint, lifted, look, mirrored, pattern, pose_at, views_of, white
+from benchmarks.box_room import (
+    BOX,
+    HEIGHT,
+    MIRROR,
+    Paint,
+    lifted,
+    mirrored,
+    pattern,
+    pose_at,
+    true_panorama,
+    views_of,
+    white,
+)
+from experiments.command import CommandParser
 from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.geometry.shell import meet_shell, world_from_shell
 from rein3d_jax.geometry.sphere import pixel_rays, rays_of_pose
@@ -61,7 +76,7 @@ def errors_of(scene: Gaussians, paint: Paint, region=everywhere) -> np.ndarray:
     """(n, 3) of the pixels of `region` at NOVEL."""
     errors = []
     for (rgb, _), place in zip(seen_from(scene, NOVEL), NOVEL, strict=True):
-        truth, distance, face = look(place, paint)
+        truth, distance, face = true_panorama(place, paint)
         points = place + distance[..., None] * rays_of_pose(pose_at(place), *face.shape)
         errors.append((rgb - np.clip(truth, 0, 1))[np.asarray(region(face, points))])
     return np.concatenate(errors)
@@ -155,7 +170,7 @@ def off_surface(scene: Gaussians) -> float:
 def distance_error(scene: Gaussians) -> float:
     """Metres: RMSE of rendered distances at places that nothing was fitted to."""
     pairs = zip(seen_from(scene, NOVEL), NOVEL, strict=True)
-    errors = [(distance - np.asarray(look(place, white)[1])) ** 2 for (_, distance), place in pairs]
+    errors = [(distance - np.asarray(true_panorama(place, white)[1])) ** 2 for (_, distance), place in pairs]
     return float(np.sqrt(np.mean(errors)))
 
 
@@ -226,12 +241,15 @@ ROWS = {
 }
 
 
-def main() -> None:
-    """Prints a line a row, and writes them as JSON."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main(arguments: list[str] | None = None) -> int:
+    """Prints a line a row."""
+    parser = CommandParser("stability", __doc__, "benchmarks")
     parser.add_argument("--rows", default=",".join(name.split()[0] for name in ROWS), help="numbers, comma-separated")
-    parser.add_argument("--json", metavar="FILE")
-    options = parser.parse_args()
+    parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    return parser.run(_run, arguments)
+
+
+def _run(options) -> None:
     table = {}
     for name, measure in ROWS.items():
         if name.split()[0] not in options.rows.split(","):
@@ -246,4 +264,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,4 +1,4 @@
-"""viewer.html in headless Chromium with OpenGL in software: seconds to its first picture, and a picture for the README.
+"""Seconds of viewer.html to its first picture, in headless Chromium with OpenGL in software, and a screenshot.
 
     python -m benchmarks.viewer_shot runs/room/viewer.html benchmarks/results/viewer.jpg
 
@@ -6,7 +6,6 @@ Needs the extra `browser` and a Chromium. Writes the picture, the coarse scene b
 place, and what was measured beside it as JSON.
 """
 
-import argparse
 import json
 import shutil
 import sys
@@ -16,6 +15,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from experiments.command import CommandParser
+
 SIZE = (800, 500)
 PLACE = {"x": 0.8, "y": -1.2, "yaw": 1.9, "pitch": -0.1}  # in the sample room, 1.4 m from the panorama
 FLAGS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--no-sandbox")
@@ -23,13 +24,16 @@ PATIENCE = 300  # seconds
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Exit code 0, or 1 where the page does not come to rest."""
-    from playwright.sync_api import sync_playwright
-
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.viewer_shot", description=__doc__.splitlines()[0])
+    """Exit code 0, or 1 where the page complains or does not come to rest."""
+    parser = CommandParser("viewer_shot", __doc__, "benchmarks")
     parser.add_argument("page", type=Path)
     parser.add_argument("picture", type=Path)
-    options = parser.parse_args(arguments)
+    return parser.run(_run, arguments)
+
+
+def _run(options) -> int:
+    from playwright.sync_api import sync_playwright
+
     with sync_playwright() as engine:
         browser = engine.chromium.launch(args=list(FLAGS), executable_path=shutil.which("chromium"))
         page = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
@@ -53,7 +57,7 @@ def main(arguments: list[str] | None = None) -> int:
     cv2.imwrite(str(options.picture), np.hstack(pictures), [cv2.IMWRITE_JPEG_QUALITY, 85])
     options.picture.with_suffix(".json").write_text(json.dumps(measured, indent=1) + "\n")
     print(json.dumps(measured))
-    return bool(complaints)
+    return int(bool(complaints))
 
 
 def _shown(page, index: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The scenes that engines are measured on (shared/reference/peers.md): a furnished room's surfaces as splats."""
+"""Scenes that engines are measured on: a furnished room's surfaces as splats."""
 
 import dataclasses
 

@@ -23,7 +23,7 @@ class CommandParser(argparse.ArgumentParser):
     def __init__(self, name: str, doc: str, package: str = "experiments"):
         console = Path(sys.argv[0]).stem == "rein3d"
         super().__init__(prog=f"rein3d {name}" if console else f"python -m {package}.{name}", description=_first(doc))
-        self.command = name
+        self.command, self.package = name, package
 
     def add_recipe(self, *configs: type, default: str | None = None, example: str = "quick") -> None:
         """--config, required unless there is a `default`, --set, and --keys, which prints the keys of `configs`."""
@@ -33,16 +33,16 @@ class CommandParser(argparse.ArgumentParser):
         self.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="change a key of the recipe")
         self.add_argument("--keys", action=_PrintKeys, nargs=0, configs=configs, help="print all keys of the recipe")
 
-    def run(self, work: Callable[[argparse.Namespace], None], arguments: list[str] | None = None) -> int:
-        """`work` of the parsed arguments. Exit code 0, or 2 with one line on stderr where it raises InputError."""
+    def run(self, work: Callable[[argparse.Namespace], int | None], arguments: list[str] | None = None) -> int:
+        """The exit code of `work` with the parsed arguments: 0 for None, 2 with a line on stderr for an InputError."""
         options = self.parse_args(arguments)
-        use_compile_cache()
+        if self.package == "experiments":  # benchmarks measure compilation too
+            use_compile_cache()
         try:
-            work(options)
+            return work(options) or 0
         except InputError as error:
             print(f"{self.command}: {error}", file=sys.stderr)
             return 2
-        return 0
 
 
 class _PrintKeys(argparse.Action):

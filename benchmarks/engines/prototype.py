@@ -1,4 +1,4 @@
-"""The prototype of shared/reference/peers.md, re-made from its description as a baseline; never shipped.
+"""The prototype that the project began with, re-made from its description as a baseline; never shipped.
 
 8 x 8 tiles; everything is projected, then culled, sorted by depth and (stably) by tile; each tile's list is cut into
 chunks of 32; one lax.scan over the Gaussians of a chunk, vectorised over chunks x 64 pixels; chunks of a tile joined

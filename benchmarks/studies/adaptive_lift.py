@@ -1,20 +1,22 @@
-"""Gaussians against PSNR at novel views, lifted only: the adaptive lift at several shares, beside one Gaussian for each
-pixel. Means over rooms, with standard errors.
+"""PSNR at novel views against Gaussians: the adaptive lift at several shares, beside one Gaussian a pixel.
+
+Lifted only, not refined. Means over rooms, with standard errors.
 
     python -m benchmarks.studies.adaptive_lift --rooms FOLDER --json benchmarks/results/adaptive_lift.json
 """
 
-import argparse
 import json
+import sys
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
-from experiments.evaluate.target import Target, targets
 
+from experiments.command import CommandParser
 from experiments.config import load_config
-from experiments.evaluate.room import Room, room_folders
+from experiments.evaluate.held_out import HeldOutPicture, held_out_pictures
+from experiments.evaluate.room import EvaluationRoom, room_sources
 from experiments.reconstruct.config import ReconstructConfig
 from rein3d_jax.evaluate.regions import OBSERVED
 from rein3d_jax.io.files.atomic import write_text
@@ -23,16 +25,16 @@ from rein3d_jax.pipeline.survey import lift_scene
 from rein3d_jax.rasterize import RasterizeConfig, allocate, enlarge, render
 from rein3d_jax.scene import Gaussians
 
-RECIPE = "experiments/recipes/quick.toml"
+RECIPE = "quick"
 SHARES = (1.0, 0.15, 0.25, 0.5, 0.1, 0.05)  # the first is what the others are compared with
 
 
 @dataclass(frozen=True)
 class Case:
-    """A room as this workload wants it: what is lifted, and the pictures to be met."""
+    """A room, and the pictures held out of it."""
 
-    room: Room
-    views: list[Target]
+    room: EvaluationRoom
+    views: list[HeldOutPicture]
 
 
 def variants(lift: LiftConfig) -> dict[str, LiftConfig]:
@@ -85,17 +87,20 @@ def summary(rows: list[dict], base: list[dict]) -> dict:
     }
 
 
-def main() -> None:
-    """Prints a line a variant, and writes the table as JSON."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main(arguments: list[str] | None = None) -> int:
+    """Prints a line a variant."""
+    parser = CommandParser("studies.adaptive_lift", __doc__, "benchmarks")
     parser.add_argument("--rooms", metavar="FOLDER", required=True)
-    parser.add_argument("--json", metavar="FILE")
-    options = parser.parse_args()
+    parser.add_argument("--json", metavar="FILE", help="write the table there")
+    return parser.run(_run, arguments)
+
+
+def _run(options) -> None:
     config = load_config(ReconstructConfig, RECIPE, [])
     cases = []
-    for folder in room_folders(options.rooms):
-        room = Room(folder, config)
-        cases.append(Case(room, [view for view in targets(room) if view.kind != "panorama"]))
+    for source in room_sources(options.rooms):
+        room = EvaluationRoom(source, config)
+        cases.append(Case(room, [view for view in held_out_pictures(room) if view.kind != "panorama"]))
     table, base = {}, None
     for name, variant in variants(config.lift).items():
         rows = rows_of(variant, cases, config.rasterize)
@@ -108,4 +113,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,14 +1,15 @@
-"""The automatic choice beside the grid it stands for: PSNR against seconds, a point a row of scene_study's `choice`.
+"""A chart of the automatic choice beside the grid it stands for: PSNR against seconds, a point a row of studies.scene.
 
     python -m benchmarks.studies.choice_chart [benchmarks/results/scene_choice.json] [--png FILE]
 """
 
-import argparse
 import io
+import sys
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from experiments.command import CommandParser
 from rein3d_jax.io.files.atomic import write_bytes
 from rein3d_jax.io.files.json_file import read_json
 
@@ -43,16 +44,19 @@ def draw(rows: dict[str, dict], rooms: int) -> bytes:
     return stream.getvalue()
 
 
-def main() -> None:
+def main(arguments: list[str] | None = None) -> int:
     """Reads the table, writes the picture."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("table", nargs="?", default=RESULT)
+    parser = CommandParser("studies.choice_chart", __doc__, "benchmarks")
+    parser.add_argument("table", nargs="?", default=RESULT, help="of `studies.scene choice` (default: %(default)s)")
     parser.add_argument("--png", metavar="FILE", help="default: beside the table")
-    options = parser.parse_args()
+    return parser.run(_run, arguments)
+
+
+def _run(options) -> None:
     table = read_json(Path(options.table))
     picture = Path(options.png or Path(options.table).with_suffix(".png"))
     write_bytes(picture, draw(table["rows"], len(table["rooms"])))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

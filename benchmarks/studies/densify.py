@@ -1,13 +1,13 @@
 """PSNR against count: default densification, relocation (MCMC) and pruning alone, at five budgets of Gaussians.
 
-    python -m benchmarks.studies.densify [--rooms ../shared/rooms] [--limit 3] [--json FILE]
+    python -m benchmarks.studies.densify --rooms FOLDER [--limit 3] [--json FILE]
 
 All start from the same fused scene and take the same steps over the same views. The baseline is one Gaussian a pixel,
 pruned by opacity half-way; densifiers start at 70 % of the budget, by contribution, and grow into the rest.
 """
 
-import argparse
 import json
+import sys
 from collections import deque
 from dataclasses import replace
 from pathlib import Path
@@ -17,9 +17,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from benchmarks.studies.scene import GROWING, RECIPE, SIZE, Bench, summary
+from experiments.command import CommandParser
 from experiments.compiled_programs import forget_when_many
 from experiments.config import load_config
-from experiments.evaluate.room import Room, room_folders
+from experiments.evaluate.room import EvaluationRoom, RoomSource, room_sources
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.quality import is_novel, render_views
 from rein3d_jax.evaluate.metrics import psnr
@@ -51,8 +52,8 @@ def scene_of(method: str, count: int, scene: Gaussians, views: Views, extent: fl
     if method == "opacity":
         half = replace(still, steps=config.steps // 2)
         grown = fit(compact(scene, spare=0.0), views, extent, half, stages)
-        kept = prune_to(grown, jax.nn.sigmoid(grown.opacity_logits), count)
-        return fit(compact(kept, spare=0.0), views, extent, half, stages)
+        pruned = prune_to(grown, jax.nn.sigmoid(grown.opacity_logits), count)
+        return fit(compact(pruned, spare=0.0), views, extent, half, stages)
     cameras = [camera_of(views, int(i)) for i in np.linspace(0, len(views.rgb) - 1, 48)]
     weight = contribution(scene, cameras, config=stages.rasterize)
     if method == "contribution":
@@ -62,10 +63,10 @@ def scene_of(method: str, count: int, scene: Gaussians, views: Views, extent: fl
     return fit(buffer, views, extent, replace(config, densification=method), stages)
 
 
-def measure(folder: Path, config: ReconstructConfig) -> dict[str, dict]:
+def measure(source: RoomSource, config: ReconstructConfig) -> dict[str, dict]:
     """Row -> figures of a room."""
-    states, _ = (bench := Bench(folder)).fused(config)
-    panorama, room = bench.made[config.input.height][0], Room(folder, config)
+    states, _ = (bench := Bench(source)).fused(config)
+    panorama, room = bench.made[config.input.height][0], EvaluationRoom(source, config)
     views = collect_views(panorama, [state.video for state in states], stages=config)
     truth = [view for view in room.traced.views if is_novel(view)]
     living, rows = int(states[-1].scene.alive.sum()), {}
@@ -77,21 +78,24 @@ def measure(folder: Path, config: ReconstructConfig) -> dict[str, dict]:
             found = float(np.mean([psnr(p, view.rgb) for p, view in zip(pictures, truth, strict=True)]))
             row = {"psnr": found, "count": int(jnp.sum(scene.alive)), "seconds": 0.0, "paths": len(states)}
             rows[f"{method}, {budget:.0%}"] = row
-            print(folder.name, method, budget, row, flush=True)
+            print(source.name, method, budget, row, flush=True)
             forget_when_many()
     return rows
 
 
-def main() -> None:
-    """Prints a line a row, and writes the table as JSON."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rooms", default="../shared/rooms")
+def main(arguments: list[str] | None = None) -> int:
+    """Prints a line a row."""
+    parser = CommandParser("studies.densify", __doc__, "benchmarks")
+    parser.add_argument("--rooms", metavar="FOLDER", required=True)
     parser.add_argument("--limit", type=int, help="rooms at most")
-    parser.add_argument("--json", metavar="FILE")
-    options = parser.parse_args()
-    folders = room_folders(options.rooms, options.limit)
+    parser.add_argument("--json", metavar="FILE", help="write the table there")
+    return parser.run(_run, arguments)
+
+
+def _run(options) -> None:
+    sources = room_sources(options.rooms, options.limit)
     config = load_config(ReconstructConfig, RECIPE, [*SIZE, *GROWING])
-    found = [measure(folder, config) for folder in folders]
+    found = [measure(source, config) for source in sources]
     rows = {}
     for name in found[0]:
         base = [room["opacity, " + name.split(", ")[1]] for room in found]
@@ -99,9 +103,10 @@ def main() -> None:
         del rows[name]["seconds"]
         print(f"{name:24s}", rows[name])
     if options.json:
-        table = {"recipe": RECIPE, "changed": (*SIZE, *GROWING), "rooms": [f.name for f in folders], "rows": rows}
+        rooms = [source.name for source in sources]
+        table = {"recipe": RECIPE, "changed": (*SIZE, *GROWING), "rooms": rooms, "rows": rows}
         write_text(Path(options.json), json.dumps(table, indent=1) + "\n")
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

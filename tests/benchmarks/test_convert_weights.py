@@ -2,7 +2,6 @@
 
 import io
 import pickle
-import sys
 
 import numpy as np
 import pytest
@@ -31,12 +30,11 @@ def test_anything_else_is_refused(trap):
 
 
 @pytest.mark.parametrize("data", [None, b"something else"])
-def test_another_archive_is_refused(tmp_path, monkeypatch, capsys, data):
+def test_another_archive_is_refused(tmp_path, capsys, data):
     archive = tmp_path / "basicsr-1.4.2.tar.gz"
     if data is not None:
         archive.write_bytes(data)
-    monkeypatch.setattr(sys, "argv", ["convert_weights", "niqe", str(archive), str(tmp_path / "out.npz")])
-    assert convert_weights.main() == 2
+    assert convert_weights.main(["niqe", str(archive), str(tmp_path / "out.npz")]) == 2
     error = capsys.readouterr().err
     assert str(archive) in error and error.count("\n") == 1
     assert not (tmp_path / "out.npz").exists()
