@@ -86,7 +86,7 @@ def _steps(room: Room, pose: jax.Array, height: int) -> tuple[Vector, Vector]:
 
 
 def _in_room(room: Room, pose: jax.Array, camera: Vector) -> Vector:
-    """Vectors (h, w) in the axes of a panorama that looks along its +X, in the room's axes."""
+    """Vectors (h, w) in the room's axes, of vectors in a panorama's own, whose +X is its centre column."""
     rotation = jnp.matmul(pose[:3, :3], world_from_camera_axes().T, precision="highest")
     rotation = jnp.matmul(_room_from_world(room), rotation, precision="highest")
     rows = [[rotation[i, j] for j in range(3)] for i in range(3)]
