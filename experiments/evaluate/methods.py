@@ -82,7 +82,7 @@ def _refined(room: EvaluationRoom, output: Path) -> tuple[Gaussians, float]:
         room.config,
         output=str(output),
         input=InputConfig(**files, views=None, height=room.config.input.height),
-        film=FilmConfig(width=16, height=16, step=10.0, turn=3.0),  # nobody watches it
+        film=FilmConfig(width=16, height=16, step=10.0, yaw_step=3.0),  # nobody watches it
     )
     metrics = run_job(config, resume=True)
     seconds = sum(spent for stage, spent in metrics["seconds"].items() if stage not in ("write", "total"))

@@ -1,4 +1,4 @@
-"""The film: out and back along every trajectory, turning at the panorama's centre."""
+"""The film: out and back along every trajectory, yawing at the panorama's centre."""
 
 import dataclasses
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ class FilmConfig(Settings):
     height: int = setting(270, "of a frame", within="[16, 8192]", unit="pixels")
     fov: float = setting(1.5, "across the width", within="(0, 3]", unit="radians")
     step: float = setting(0.2, "between frames on a path", within="(0, inf)", unit="metres")
-    turn: float = setting(0.1, "between frames on the way round to the next path", within="(0, inf)", unit="radians")
+    yaw_step: float = setting(0.1, "between frames on the way round to the next path", within="(0, inf)", unit="radians")
     rate: int = setting(15, "of the film", within="[1, 240]", unit="frames a second")
 
 
@@ -51,6 +51,6 @@ def flythrough(
         yield from out
         yield from out[-2::-1]
         following = azimuths[(index + 1) % len(azimuths)]
-        turn = (following - azimuth) % (2 * np.pi)
-        for angle in np.arange(film.turn, turn, film.turn):
+        between = (following - azimuth) % (2 * np.pi)
+        for angle in np.arange(film.yaw_step, between, film.yaw_step):
             yield picture(_camera(np.zeros(3), -(azimuth + angle), film))

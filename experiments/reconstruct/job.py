@@ -40,7 +40,7 @@ class _Job:
     clock: Clock
 
     def stage(self, name: str, depends, make):
-        """The result of a stage, told to whoever watches."""
+        """The result of a stage, shown to whoever watches."""
         result = self.store.run(name, depends, make)
         self.progress.done(self.store.finished[-1])
         return result

@@ -38,7 +38,7 @@ stop = 4
 width = 64
 height = 48
 step = 0.8
-turn = 0.8
+yaw_step = 0.8
 """
 
 

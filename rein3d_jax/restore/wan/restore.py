@@ -30,7 +30,7 @@ class SampleConfig(Settings):
 
     steps: int = setting(50, "of the sampler", within="[1, inf)")
     shift: float = setting(3.0, "of the schedule towards high noise, for large pictures", within="(0, inf)")
-    guidance: float = setting(5.0, "scale of the classifier-free guidance; 1: one pass a step, without it")
+    guidance: float = setting(5.0, "classifier-free; 1: one pass a step, without it", within="(-inf, inf)")
     solver: str = setting("unipc", "of the flow's ODE", among=tuple(SOLVERS))
     noise: str = setting("latitude", "correlated as pixels crowd, white, or the paper's warp", among=tuple(NOISES))
     random_yaw: bool = setting(True, "yaw the panorama at random from step to step, for a RoPE that is not circular")

@@ -2,7 +2,8 @@
 
 B starts at zero, so the adapted network starts as the base. The pairs live in a flat dict beside the parameters, and
 merging them gives ordinary parameters, which are sampled and saved as any others. Training merges at each step, too:
-that keeps one network for all, and costs a second copy of the named kernels and their gradient (memory.py counts them).
+there is one network for all, at the cost of a second copy of the named kernels and their gradient (memory.py counts
+them).
 """
 
 from dataclasses import dataclass
@@ -14,16 +15,16 @@ from flax import struct
 from rein3d_jax.errors import InputError
 from rein3d_jax.settings import Settings, setting
 
+_KERNELS = ("query", "key", "value", "out", "ffn_in", "ffn_out")
+
 
 @dataclass(frozen=True)
 class LoraConfig(Settings):
     """Low-rank adaptation of the transformer."""
 
     rank: int = setting(32, "of each pair", within="[1, inf)")
-    gain: float = setting(1.0, "of the pairs' product over the kernel")
-    kernels: tuple[str, ...] = setting(
-        ("query", "key", "value", "out", "ffn_in", "ffn_out"), "names of those adapted, in each block of both branches"
-    )
+    gain: float = setting(1.0, "of the pairs' product over the kernel", within="(-inf, inf)")
+    kernels: tuple[str, ...] = setting(_KERNELS, "names of those adapted, in each block of both branches")
 
 
 @struct.dataclass
