@@ -40,18 +40,12 @@ class ExamplesConfig(Settings):
     count: int = setting(1000, "examples", within="[1, inf)")
     seed: int = setting(0, "of all that is drawn", within="[0, inf)")
     frames: int = setting(6, "of each path, the anchor among them", within="[2, inf)")
-    height: int = setting(
-        128, "rendered and filled, a multiple of 32; half of them are stored", within="[32, inf)", unit="rows"
-    )
+    height: int = setting(128, "rendered, a multiple of 32; half is stored", within="[32, inf)", unit="rows")
     min_length: float = setting(1.0, "of a path", within="(0, inf)", unit="metres")
     max_length: float = setting(3.0, "of a path", within="(0, inf)", unit="metres")
     min_hidden: float = setting(0.02, "share of the last frame that the anchor must not see", within=_SHARE)
-    furnished: tuple[float, ...] = setting(
-        (0.2, 0.5, 0.9), "rooms.furnished of one example after another", within=_SHARE
-    )
-    shell_support: float = setting(
-        0.3, "as restore.shell_support: share on a box, below which a room has no shell", within="[0, inf)"
-    )
+    furnished: tuple[float, ...] = setting((0.2, 0.5, 0.9), "rooms.furnished, example by example", within=_SHARE)
+    shell_support: float = setting(0.3, "share on a box, below which a room has no shell", within="[0, inf)")
     misplaced: float = setting(0.3, "share of examples whose shell's walls are off by up to 15 %", within=_SHARE)
     explore: ExploreConfig = ExploreConfig(camera_radius=0.15, stop_buffer=0.15)
     rooms: RoomConfig = RoomConfig()

@@ -39,7 +39,7 @@ def data_parallel(
     if backend == "jit":
         return _over_mesh(step, mesh, axis, sharded)
     if sharded:
-        raise InputError('backend "pmap" keeps the whole state on each device; choose "jit" to shard it')
+        raise InputError('backend "pmap" has the whole state on each device; choose "jit" to shard it')
     return _over_replicas(step, mesh, axis)
 
 

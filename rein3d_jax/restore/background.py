@@ -27,7 +27,7 @@ ON_FACE = 0.1  # relative distance within which a pixel shows the shell and not 
 
 @struct.dataclass
 class Background:
-    """What the room looks like where nothing stands in front."""
+    """The empty room: its shell and the colour of each face."""
 
     shell: RoomShell
     rgb: jax.Array  # (6, 3) mean colour of each face, as the input panorama saw it

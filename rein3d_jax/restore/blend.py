@@ -20,10 +20,10 @@ def blend(restored: jax.Array, rendered: jax.Array, alpha: jax.Array, *, observe
     """sRGB (t, h, w, 3) in [0, 1]: `restored` by a restorer that redraws all, colours matched to the `rendered` clip's,
     whose pixels return where alpha (t, h, w) says that they were observed."""
     matched = jnp.clip(match_colours(restored, rendered, observed_share(alpha, observed)), 0.0, 1.0)
-    return keep_observed(matched, rendered, alpha, observed=observed)
+    return blend_unmatched(matched, rendered, alpha, observed=observed)
 
 
-def keep_observed(restored: jax.Array, rendered: jax.Array, alpha: jax.Array, *, observed: float) -> jax.Array:
+def blend_unmatched(restored: jax.Array, rendered: jax.Array, alpha: jax.Array, *, observed: float) -> jax.Array:
     """`blend` without matching colours: for a restorer that redraws holes alone."""
     share = observed_share(alpha, observed)
     mixed = restored + share[..., None] * (rendered - restored)

@@ -1,6 +1,6 @@
 """OpenCV's inpainting, frame by frame, and no fill at all.
 
-They know nothing of depth: colour and distance are inpainted alike, from all sides of a hole. The only wrap they
+They use no depth: colour and distance are inpainted alike, from all sides of a hole. The only wrap they
 get is a margin of the picture's other edge.
 """
 

@@ -2,8 +2,8 @@
 
 The paper warps columns by x' = x_c + (x - x_c) cos(latitude) and does not say how it interpolates. Read bilinearly
 ("paper"), variance falls to 0.68 and the seam tears: at 56 x 112, neighbours' correlation is 0.37 and across the seam
-0.00. "latitude" keeps the idea and the law of noise: a row draws round(w cos(latitude)) samples on a CIRCLE and mixes
-neighbours with weights of unit L2 norm, so that each latent is exactly N(0, 1) and no column is special.
+0.00. "latitude" has the idea and the law of noise both: a row draws round(w cos(latitude)) samples on a CIRCLE and
+mixes neighbours with weights of unit L2 norm, so that each latent is exactly N(0, 1) and no column is special.
 """
 
 import jax

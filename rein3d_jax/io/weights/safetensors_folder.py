@@ -131,7 +131,7 @@ def _check_fit(folder, rows, tensors):
                 faults.append(f"has {row.name} as {view.get_dtype()}, not one of {', '.join(sorted(_FLOATS))}")
     if faults:
         more = f"; and {len(faults) - _NAMED} more" if len(faults) > _NAMED else ""
-        raise InputError(f"{folder} {'; '.join(faults[:_NAMED])}{more}: choose the preset that it was made for")
+        raise InputError(f"{folder} {'; '.join(faults[:_NAMED])}{more}: choose the sizes that it was made for")
 
 
 def _read_leaf(folder, tensors, rows, leaf):

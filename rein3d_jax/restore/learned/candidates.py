@@ -66,9 +66,9 @@ def fill_openings(
 ) -> tuple[jax.Array, jax.Array]:
     """A frame's `fill` (colour (h, w, 3), metres (h, w)), but a hole in a window shows what is outside.
 
-    The shell is open where the anchor saw far beyond it. A window's
-    distance is mostly not known, so what shows through it is rendered far away, and as the camera nears the wall the
-    window grows around it: a hole, which goes on with what is seen of the outside.
+    The shell is open where the anchor saw far beyond it. A window's distance is mostly not known, so what shows through
+    it is rendered far away, and as the camera nears the wall the window grows around it: a hole, which goes on with
+    what is seen of the outside.
     """
     outside = known & (distance > OUTSIDE * jnp.median(anchor.distance))
     image = jnp.concatenate([rgb, 1 / jnp.maximum(distance, 1e-3)[..., None]], axis=-1)

@@ -14,12 +14,7 @@ _SIZE = "[1, inf)"
 class NetworkConfig(Settings):
     """Sizes of the learned restorer's network."""
 
-    rows: int = setting(
-        64,
-        "of its input, a multiple of 8; a taller video is shrunk, and the output enlarged",
-        within=_SIZE,
-        unit="rows",
-    )
+    rows: int = setting(64, "of its input, a multiple of 8; taller videos are shrunk and enlarged again", within=_SIZE)
     fine: int = setting(64, "channels of a cell of 4 x 4 pixels", within=_SIZE)
     width: int = setting(128, "channels of a token of 8 x 8 pixels, a multiple of 4 x heads", within=_SIZE)
     depth: int = setting(2, "transformer blocks", within=_SIZE)

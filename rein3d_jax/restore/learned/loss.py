@@ -34,15 +34,11 @@ class Example:
 class LossConfig(Settings):
     """Weights of the learned restorer's loss."""
 
-    latitude: float = setting(
-        0.1, "lambda of W = lambda + (1 - lambda) cos(latitude): the weight left at the poles", within="[0, 1]"
-    )
+    latitude: float = setting(0.1, "weight left at the poles, lambda + (1 - lambda) cos(latitude)", within="[0, 1]")
     observed: float = setting(0.0, "weight of a pixel that was observed, against 1 in a hole", within="[0, 1]")
     distance: float = setting(0.1, "weight of the distance's logarithm beside colour", within="[0, inf)")
     gradient: float = setting(0.05, "weight of differences between neighbouring pixels of a hole", within="[0, inf)")
-    knee: float = setting(
-        0.25, "errors well below it count by their square, as in PSNR, above it by themselves", within="(0, inf)"
-    )
+    knee: float = setting(0.25, "errors far below it count squared, as in PSNR, above it linearly", within="(0, inf)")
 
 
 def clean_residual(example: Example) -> jax.Array:

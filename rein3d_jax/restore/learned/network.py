@@ -1,6 +1,6 @@
 """The network: a U of convolutions around a transformer over the clip's tokens. Linen; params are a plain dict.
 
-Nothing in it knows where the seam is: rolling the clip by a multiple of TOKEN pixels rolls the result. Time enters
+No column is special in it: rolling the clip by a multiple of TOKEN pixels rolls the result. Time enters
 through each frame's place in the room alone (a feature), so clips of any length and spacing go through.
 """
 

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from rein3d_jax.restore.background import Background
-from rein3d_jax.restore.blend import keep_observed
+from rein3d_jax.restore.blend import blend_unmatched
 from rein3d_jax.restore.learned.candidates import clip_of
 from rein3d_jax.restore.learned.sample import Learned, sample_clip
 from rein3d_jax.scene import Video
@@ -36,7 +36,7 @@ def restore_learned(
     clip = clip_of(video, observed=observed, background=background)
     padded = jax.tree.map(partial(_padded, count=-len(clip.alpha) % _GROUP), clip)
     drawn = sample_clip(key, learned, padded, steps)[: len(clip.alpha)]
-    rgb = keep_observed(jnp.clip(drawn[..., :3], 0.0, 1.0), video.rgb, video.alpha, observed=observed)
+    rgb = blend_unmatched(jnp.clip(drawn[..., :3], 0.0, 1.0), video.rgb, video.alpha, observed=observed)
     return video.replace(rgb=rgb, distance=clip.fill_distance[..., 0])
 
 

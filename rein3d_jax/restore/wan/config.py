@@ -1,4 +1,4 @@
-"""Sizes and switches of the full-size network; a preset is a config with a name.
+"""Sizes and switches of the full-size network.
 
 The defaults are Wan2.1-VACE-1.3B (Wan 2025; VACE 2025). One code path serves every size.
 """
@@ -21,9 +21,7 @@ class DitConfig(Settings):
     head_dim: int = setting(128, "channels of a head, an even number: RoPE rotates pairs on 3 axes", within="[6, inf)")
     ffn: int = setting(8960, "channels of a block's hidden layer", within=_SIZE)
     depth: int = setting(30, "main blocks", within=_SIZE)
-    control_every: int = setting(
-        2, "main blocks from one control hint to the next, the first at block 0; 0: no control", within="[0, inf)"
-    )
+    control_every: int = setting(2, "main blocks from one control hint to the next; 0: no control", within="[0, inf)")
     channels: int = setting(16, "of the latents", within=_SIZE)
     control_channels: int = setting(96, "of the control's latents", within=_SIZE)
     text_dim: int = setting(4096, "channels of the embedded text", within=_SIZE)
@@ -31,14 +29,10 @@ class DitConfig(Settings):
     patch: tuple[int, int, int] = setting((1, 2, 2), "latents of a token in time, height and width", within=_SIZE)
     epsilon: float = setting(1e-6, "of the norms", within="(0, inf)")
     circular: bool = setting(False, "width RoPE of integer harmonics: a yaw of whole tokens becomes an exact symmetry")
-    dtype: str = setting(
-        "bfloat16", "of the large matrix products; norms, modulation and rotation stay in float32", among=DTYPES
-    )
+    dtype: str = setting("bfloat16", "of large matrix products; norms, modulation, rotation: float32", among=DTYPES)
     param_dtype: str = setting("float32", "of the parameters", among=DTYPES)
     remat: bool = setting(False, "recompute each block in the backward pass, for memory")
-    kernel: str = setting(
-        "chunked", "of the attention: chunked runs anywhere; cudnn on NVIDIA devices, in bfloat16", among=KERNELS
-    )
+    kernel: str = setting("chunked", "attention; chunked runs anywhere, cudnn in bfloat16 on NVIDIA's", among=KERNELS)
     query_chunk: int = setting(1024, "queries at once in the chunked attention", within=_SIZE)
 
     def __post_init__(self):
@@ -66,9 +60,7 @@ class VaeConfig(Settings):
     base: int = setting(96, "channels at full resolution", within=_SIZE)
     multipliers: tuple[int, ...] = setting((1, 2, 4, 4), "channels of each stage over the base", within=_SIZE)
     blocks: int = setting(2, "residual blocks a stage in the encoder; the decoder has one more", within=_SIZE)
-    halve_time: tuple[bool, ...] = setting(
-        (False, True, True), "whether each of the encoder's downsamplings halves time too"
-    )
+    halve_time: tuple[bool, ...] = setting((False, True, True), "whether the encoder's downsamplings halve time")
     circular: bool = setting(False, "pad the width with the other edge: exactly yaw-equivariant")
     dtype: str = setting("float32", "of the convolutions", among=DTYPES)
     param_dtype: str = setting("float32", "of the parameters", among=DTYPES)
@@ -106,11 +98,3 @@ TINY = WanConfig(
 SMALL = WanConfig(
     DitConfig(heads=6, head_dim=64, ffn=1536, depth=12, text_dim=64), VaeConfig(base=32, multipliers=(1, 2, 4, 4))
 )
-PRESETS = {"tiny": TINY, "small": SMALL, "wan2.1-vace-1.3b": WanConfig()}
-
-
-def preset(name: str) -> WanConfig:
-    """The config called `name`. Raises InputError if there is none."""
-    if name not in PRESETS:
-        raise InputError(f'preset "{name}" is unknown; choose one of {", ".join(PRESETS)}')
-    return PRESETS[name]

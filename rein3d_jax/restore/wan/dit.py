@@ -1,9 +1,9 @@
 """The diffusion transformer: noisy latents, timestep, text and control -> velocity (Wan2.1 with VACE's control branch).
 
 VACE runs a chain of control blocks beside the main one; control block j hands a hint to main block j * control_every.
-The chain needs nothing of the main blocks but their common input, so one scan walks both: a step is a control block
-and the `control_every` main blocks that follow its hint. No list of hints is kept, and compile time does not grow with
-depth. Weights are stacked (steps, ...).
+The chain needs nothing of the main blocks but their common input, so one scan goes through both: a step is a control
+block and the `control_every` main blocks that follow its hint. No list of hints is stored, and compile time does not
+grow with depth. Weights are stacked (steps, ...).
 """
 
 import flax.linen as nn

@@ -115,7 +115,7 @@ def _leaves(shapes) -> Iterator[tuple[tuple[str, ...], tuple[int, ...]]]:
 
 
 def _linear(leaf, shape, config):
-    """The tensor's shape and the axes that turn it into ours: a kernel is transposed, an embedding's unfolded."""
+    """The tensor's shape and the axes that make it ours: a kernel is transposed, an embedding's unfolded."""
     if leaf[0] in ("embed", "control_embed") and leaf[-1] == "kernel":
         return (shape[1], shape[0] // math.prod(config.patch), *config.patch), (1, 2, 3, 4, 0)
     if leaf[-1] == "kernel":

@@ -39,7 +39,7 @@ def _frequencies(channels: int) -> np.ndarray:
 
 
 def _over_grid(tables, grid):
-    """Three small tables (count, pairs) from the host, spread over the tokens on the device: a program keeps no large
+    """Three small tables (count, pairs) from the host, spread over the tokens on the device: a program has no large
     constants."""
     t, h, w = (jnp.asarray(table, jnp.float32) for table in tables)
     parts = (t[:, None, None], h[None, :, None], w[None, None])

@@ -35,12 +35,12 @@ class WindowConfig(Settings):
 
 
 def padded_length(frames: int) -> int:
-    """The least 1 + 4 n that holds `frames`."""
+    """Smallest 1 + 4 n that holds `frames`."""
     return frames + (1 - frames) % STRIDE
 
 
 def latent_length(frames: int) -> int:
-    """Latents of `frames` frames, a last unfilled one counted."""
+    """Number of latents of `frames` frames, a last unfilled one counted."""
     return 1 + (padded_length(frames) - 1) // STRIDE
 
 

@@ -16,6 +16,9 @@ from experiments.train_restore.guarded_step import batch_gradient, first_state, 
 from rein3d_jax.parallel import BACKENDS, data_mesh, data_parallel, gather
 
 PARAMETERS = {"a": jnp.array([1.0, 2.0]), "b": jnp.array(3.0)}
+# Float32 sums of 8 terms, whose magnitudes sum to less than twice the sum: 8^0.5 eps 2 = 7e-7 in any order; each
+# term is a sum itself, and its rounding some times that.
+RTOL = 1e-5
 BATCH = np.random.default_rng(0).normal(size=(8, 2)).astype(np.float32)
 CONFIG = TrainConfig(
     steps=10, optimizer=OptimizerConfig(rate=0.1, warmup=0, clip=1e9, average=0.5), guard=GuardConfig(spike=10.0)
@@ -46,8 +49,8 @@ def mean_loss(parameters):
 def test_a_batch_in_parts_has_the_gradient_of_the_whole(parts):
     gradient, value = batch_gradient(loss, PARAMETERS, BATCH.reshape(parts, -1, 2), alone)
     whole, expected = jax.grad(mean_loss)(PARAMETERS), mean_loss(PARAMETERS)
-    np.testing.assert_allclose(value, expected, rtol=1e-5)  # float32 sums of 8 in another order
-    jax.tree.map(partial(np.testing.assert_allclose, rtol=1e-5), gradient, whole)
+    np.testing.assert_allclose(value, expected, rtol=RTOL)
+    jax.tree.map(partial(np.testing.assert_allclose, rtol=RTOL), gradient, whole)
 
 
 def test_a_step_descends_and_the_average_follows():
@@ -100,7 +103,7 @@ def on_many_devices():
         for parts in (1, 2):
             run = data_parallel(gradient, data_mesh(), backend=backend, axis=1)
             _, found = run(jax.tree.map(np.asarray, PARAMETERS), BATCH.reshape(parts, -1, 2))
-            jax.tree.map(partial(np.testing.assert_allclose, rtol=1e-5), found, jax.grad(mean_loss)(PARAMETERS))
+            jax.tree.map(partial(np.testing.assert_allclose, rtol=RTOL), found, jax.grad(mean_loss)(PARAMETERS))
     wide = {"a": np.linspace(0, 1, 2048, dtype=np.float32).reshape(2, 1024), "b": np.zeros(1024, np.float32)}
 
     def wide_gradient(parameters, batch, total):
@@ -110,7 +113,8 @@ def on_many_devices():
     assert state["a"].addressable_data(0).shape == (2, 256) and not state["a"].is_fully_replicated
     jax.tree.map(np.testing.assert_array_equal, gather(state), wide)
     alone = jax.grad(lambda p: wide_loss(p, BATCH)[0] / wide_loss(p, BATCH)[1])(wide)
-    jax.tree.map(partial(np.testing.assert_allclose, rtol=1e-5, atol=1e-6), found, alone)
+    # Magnitudes sum to 3.6 at most: 8^0.5 eps 3.6 = 1e-6 in any order, and the terms themselves are rounded.
+    jax.tree.map(partial(np.testing.assert_allclose, atol=5e-6), found, alone)
 
 
 def wide_loss(parameters, part):

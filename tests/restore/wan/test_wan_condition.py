@@ -55,8 +55,8 @@ def test_folding_a_mask_loses_no_pixel_of_the_frames_it_takes():
 
 
 def test_a_yaw_by_whole_latents_commutes():
-    turned = control(*(jnp.roll(x, 8, axis=axis) for x, axis in ((RGB, 3), (ALPHA, 3), (ANCHOR, 2))))
-    np.testing.assert_array_equal(turned, jnp.roll(control(), 1, axis=3))
+    moved = control(*(jnp.roll(x, 8, axis=axis) for x, axis in ((RGB, 3), (ALPHA, 3), (ANCHOR, 2))))
+    np.testing.assert_array_equal(moved, jnp.roll(control(), 1, axis=3))
 
 
 def test_a_fully_seen_clip_asks_for_nothing_and_an_unseen_one_for_all():

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import pytest
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.restore.wan.config import SMALL, TINY, preset
+from rein3d_jax.restore.wan.config import SMALL, TINY, WanConfig
 from rein3d_jax.restore.wan.dit import Dit
 from rein3d_jax.restore.wan.training.memory import (
     GIB,
@@ -22,7 +22,7 @@ from rein3d_jax.restore.wan.training.memory import (
 from rein3d_jax.restore.wan.training.trainable import TrainableConfig
 from rein3d_jax.restore.wan.vae import Vae
 
-LARGE = preset("wan2.1-vace-1.3b")
+LARGE = WanConfig()
 
 
 def test_the_papers_clip_has_the_tokens_it_should():

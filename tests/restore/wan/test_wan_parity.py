@@ -17,7 +17,7 @@ from safetensors.numpy import save_file
 
 from rein3d_jax.io.weights.safetensors_folder import load_params
 from rein3d_jax.restore.wan.condition import control_latents
-from rein3d_jax.restore.wan.config import TINY, VaeConfig, preset
+from rein3d_jax.restore.wan.config import TINY, VaeConfig, WanConfig
 from rein3d_jax.restore.wan.dit import Dit
 from rein3d_jax.restore.wan.names import dit_rows, vae_rows
 from rein3d_jax.restore.wan.sampler import sample_latents
@@ -240,14 +240,14 @@ def test_the_original_names_are_those_that_diffusers_converts():
     pairs = zip(ours, (row.name for row in dit_rows(shapes, TINY.dit, "diffusers")), strict=True)
     for original, converted in pairs:
         assert set(single_file_utils.convert_wan_transformer_to_diffusers({original: np.zeros(6)})) == {converted}
-    config = preset("wan2.1-vace-1.3b").vae
+    config = WanConfig().vae
     rows = [vae_rows(vae_shapes(config), config, layout) for layout in ("wan", "diffusers")]
     for original, converted in zip(*rows, strict=True):
         assert set(single_file_utils.convert_wan_vae_to_diffusers({original.name: 0})) == {converted.name}
 
 
-def test_the_large_preset_has_the_tensors_of_the_reference():
-    config = preset("wan2.1-vace-1.3b")
+def test_the_published_size_has_the_tensors_of_the_reference():
+    config = WanConfig()
     with torch.device("meta"):
         dit = diffusers.WanVACETransformer3DModel(
             num_attention_heads=12, num_layers=30, ffn_dim=8960, vace_layers=list(range(0, 30, 2))

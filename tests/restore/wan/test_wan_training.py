@@ -9,7 +9,7 @@ import optax
 import pytest
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.restore.wan.config import TINY, preset
+from rein3d_jax.restore.wan.config import TINY, WanConfig
 from rein3d_jax.restore.wan.dit import Dit
 from rein3d_jax.restore.wan.training.lora import LoraConfig, LoraPair, merge_lora, start_pairs
 from rein3d_jax.restore.wan.training.memory import count, dit_shapes
@@ -52,7 +52,8 @@ def trainable(part):
 
 
 def test_the_loss_of_a_velocity_that_is_off_by_one_is_one():
-    np.testing.assert_allclose([mean(0.0), mean(1.0)], [0, 1], atol=1e-5)  # float32, divided by levels above 0.1
+    # Float32 sums of N = 3,072 numbers, none negative: sqrt(N) eps = 7e-6 of themselves.
+    np.testing.assert_allclose([mean(0.0), mean(1.0)], [0, 1], atol=2e-5)
 
 
 def test_the_anchor_counts_nothing_and_poles_count_little():
@@ -74,7 +75,8 @@ def test_a_batch_in_parts_has_the_sums_of_the_whole():
         jax.tree.map(lambda x, i=i: x[i : i + 1], (TARGET.control[..., :16], TARGET, KEYS)) for i in (0, 1)
     )
     whole = sums(TARGET.control[..., :16], TARGET, KEYS)
-    np.testing.assert_allclose(sums(*first) + sums(*second), whole, rtol=1e-5)  # float32 sums
+    # Two float32 sums of N = 3,072 squares, none negative: each off by sqrt(N) eps = 7e-6 of itself in any order.
+    np.testing.assert_allclose(sums(*first) + sums(*second), whole, rtol=2e-5)
 
 
 def test_a_target_holds_the_clean_frame_0_and_then_the_clean_clip():
@@ -90,7 +92,7 @@ def test_a_target_holds_the_clean_frame_0_and_then_the_clean_clip():
 
 
 def test_the_adapter_is_what_vace_adds_to_wan():
-    shapes = dit_shapes(preset("wan2.1-vace-1.3b").dit)
+    shapes = dit_shapes(WanConfig().dit)
     adapter, wan = start_training(KEY, shapes, TrainableConfig("adapter"))
     assert (count(adapter), count(wan)) == (2_153_972_032 - 1_418_996_800, 1_418_996_800)
 
@@ -119,8 +121,8 @@ def test_merged_kernels_are_the_base_and_a_path_of_low_rank_beside_it(shallow_di
     assert not np.any(change["steps"]["block_0"]["self_attention"]["query"]["bias"])
 
 
-def test_the_default_kernels_are_those_of_every_block_of_the_large_preset():
-    config, shapes = LoraConfig(), dit_shapes(preset("wan2.1-vace-1.3b").dit)
+def test_the_default_kernels_are_those_of_every_block_of_the_published_size():
+    config, shapes = LoraConfig(), dit_shapes(WanConfig().dit)
     pairs = jax.eval_shape(lambda: start_pairs(KEY, shapes, config))
     widths = {1536 + 1536: 8, 1536 + 8960: 2}  # in + out: how many kernels of a block
     assert count(pairs) == 45 * config.rank * sum(width * number for width, number in widths.items())

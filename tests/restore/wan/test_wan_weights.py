@@ -11,7 +11,7 @@ from safetensors.numpy import load_file, save_file
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.weights.safetensors_folder import load_params, save_params, tensor_names
-from rein3d_jax.restore.wan.config import TINY, preset
+from rein3d_jax.restore.wan.config import TINY, WanConfig
 from rein3d_jax.restore.wan.names import LAYOUTS, dit_rows, layout_of, vae_rows
 from rein3d_jax.restore.wan.training.memory import count, dit_shapes, vae_shapes
 
@@ -57,8 +57,8 @@ def test_parameters_come_back_to_the_bit(tmp_path, part, layout, shard):
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_the_table_of_the_large_preset_is_one_to_one_and_loses_no_number(layout):
-    config = preset("wan2.1-vace-1.3b")
+def test_the_table_of_the_published_size_is_one_to_one_and_loses_no_number(layout):
+    config = WanConfig()
     for rows, shapes in (
         (dit_rows(dit_shapes(config.dit), config.dit, layout), dit_shapes(config.dit)),
         (vae_rows(vae_shapes(config.vae), config.vae, layout), vae_shapes(config.vae)),
@@ -82,7 +82,7 @@ def test_the_table_of_the_large_preset_is_one_to_one_and_loses_no_number(layout)
     ],
 )
 def test_names_and_shapes_of_the_published_transformer(layout, name, shape):
-    config = preset("wan2.1-vace-1.3b").dit
+    config = WanConfig().dit
     assert {row.name: row.shape for row in dit_rows(dit_shapes(config), config, layout)}[name] == shape
 
 

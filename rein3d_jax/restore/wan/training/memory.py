@@ -112,7 +112,7 @@ def _advice(config, work, need, capacity):
         (config.dit.kernel == "chunked" and config.dit.query_chunk > 256, "lower dit.query_chunk"),
         (
             fixed > capacity,
-            f"parameters and optimizer alone take {fixed / GIB:.1f} GiB: shard them or take a smaller preset",
+            f"parameters and optimizer alone take {fixed / GIB:.1f} GiB: shard them or take a smaller network",
         ),
         (fixed <= capacity, "take fewer frames or smaller panoramas"),
     ]

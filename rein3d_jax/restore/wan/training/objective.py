@@ -26,9 +26,7 @@ Predict = Callable[[jax.Array, jax.Array, jax.Array], jax.Array]  # (x, timestep
 class ObjectiveConfig(Settings):
     """What the full-size network is trained for."""
 
-    latitude: float = setting(
-        0.1, "lambda of W = lambda + (1 - lambda) cos(latitude): the weight left at the poles", within="[0, 1]"
-    )
+    latitude: float = setting(0.1, "weight left at the poles, lambda + (1 - lambda) cos(latitude)", within="[0, 1]")
     shift: float = setting(3.0, "of the noise levels towards high noise, as sampling's", within="(0, inf)")
     noise: str = setting("latitude", "correlated as pixels crowd, white, or the paper's warp", among=tuple(NOISES))
 

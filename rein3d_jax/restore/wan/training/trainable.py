@@ -19,9 +19,7 @@ _ADAPTER = {"control_embed", "control_in", "control", "hint"}  # VACE's context 
 class TrainableConfig(Settings):
     """Which part of the transformer is trained."""
 
-    part: str = setting(
-        "adapter", "all of it, VACE's context adapter (its own recipe), or low-rank pairs", among=TRAINABLE_PARTS
-    )
+    part: str = setting("adapter", "all, VACE's context adapter (its own recipe), or LoRA", among=TRAINABLE_PARTS)
     lora: LoraConfig = LoraConfig()
 
 
