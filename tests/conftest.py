@@ -1,17 +1,29 @@
-"""Tests compile many tiny programs once: fast compilation counts, fast code does not.
+"""Tests compile many tiny programs once: fast compilation counts, fast code does not. What was compiled is kept for the
+next run, in the folder that JAX_COMPILATION_CACHE_DIR names, or .jax_cache.
 
 Value and gradient of the rasterizer: 13.5 s to compile as for use, 1.6 s with these flags. Set before jax starts; a
 user's own XLA_FLAGS come last and win.
 """
 
 import os
+from pathlib import Path
 
 import pytest
 
 FAST_TO_COMPILE = "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false"
 os.environ["XLA_FLAGS"] = f"{FAST_TO_COMPILE} {os.environ.get('XLA_FLAGS', '')}".strip()
+os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(__file__).resolve().parents[1] / ".jax_cache"))
+os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
 
 from experiments.compiled_programs import forget_when_many  # noqa: E402
+
+
+def pytest_collection_modifyitems(config, items):
+    """Measurements run where they are asked for (-m bench), not where another selection forgets to leave them out."""
+    if "bench" not in (config.option.markexpr or ""):
+        chosen = [item for item in items if item.get_closest_marker("bench") is None]
+        config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
+        items[:] = chosen
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -28,7 +28,7 @@ MAY_IMPORT = {
     "meshes": {"scene", "geometry"},
     "io": {"scene", "geometry", "meshes"},
     "parallel": {"scene"},
-    "networks": {"io", "restore"},
+    "networks": {"io", "depth", "restore"},
     "pipeline": {"scene", "geometry", "parallel", *STAGES},
     "report": {"scene", "geometry", "evaluate"},
     "experiments": {"scene", "geometry", "meshes", "io", "networks", "parallel", "pipeline", "report", *STAGES},
