@@ -152,8 +152,8 @@ def recipe(config, tmp_path):
         (["--worker", "3/3"], "--worker 3/3: write it as I/N"),
         (["--ray", "0"], "--ray 0: at least 1"),
         (["--check"], "manifest.json"),
-        (["--set", "pairs.height=100"], "pairs.height 100 must be a multiple of rasterize.tile 8"),
-        (["--set", "pairs.frames=1"], "pairs.frames must be at least 2"),
+        (["--set", "pairs.height=100"], "pairs.height must be a multiple of rasterize.tile 8, not 100"),
+        (["--set", "pairs.frames=1"], "pairs.frames must be in [2, inf), not 1"),
         (["--set", "clip=3"], "did you mean clips?"),
     ],
 )
