@@ -44,7 +44,7 @@ def _moments(rays, weights, frame):
 
 
 def _within(rays, weights, frame, reach):
-    """Both sides keep to the cap in which alpha reaches the 1/255 cut: beyond it nothing is drawn."""
+    """Rays and weights in the cap where alpha reaches the 1/255 cut: beyond it nothing is drawn."""
     inside = rays @ frame[0] > np.cos(min(reach, np.pi))
     return rays[inside], weights[inside]
 

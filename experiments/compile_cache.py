@@ -1,4 +1,4 @@
-"""Where compiled programs are kept: a second run starts a minute sooner."""
+"""The folder of compiled programs: with it a second run starts a minute sooner."""
 
 from pathlib import Path
 
@@ -6,6 +6,6 @@ import jax
 
 
 def use_compile_cache() -> None:
-    """A folder in the user's home, unless JAX_COMPILATION_CACHE_DIR names one."""
+    """Stores compiled programs in the user's home, unless JAX_COMPILATION_CACHE_DIR names one."""
     if not jax.config.jax_compilation_cache_dir:
         jax.config.update("jax_compilation_cache_dir", str(Path.home() / ".cache" / "rein3d_jax"))

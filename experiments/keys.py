@@ -54,7 +54,7 @@ def keys_text(cls: type) -> str:
 
 
 def keys_markdown() -> str:
-    """The same of all commands' recipes. A config that stood already is not told again, only what differs there."""
+    """The same of all commands' recipes. Of a config that stood already, only what differs."""
     lines, seen = [], {}
     for command, classes in _recipes().items():
         for cls in classes:
@@ -110,7 +110,8 @@ def _markdown(command: str, table: _Table, seen: dict[type, tuple[str, _Table]])
         but = f", but {', '.join(changed)}" if changed else ""
         return [f"{title}: as `[{first.name}]` of {where}{but}."]
     seen[type(table.config)] = command, table
-    rows = [f"| `{key}` | `{default}` | {m.unit} | {m.limits} | {m.text} |" for key, default, m in table.leaves]
+    cells = [(f"`{key}`", f"`{default}`", m.unit, m.limits, m.text) for key, default, m in table.leaves]
+    rows = [f"| {' | '.join(cell.replace('|', '&#124;') for cell in row)} |" for row in cells]
     head = ["", "| key | default | unit | must be | meaning |", "|---|---|---|---|---|"] if rows else []
     return [f"{title}: {_first_line(table.config)}", *head, *rows]
 

@@ -1,4 +1,4 @@
-"""One engine in a process of its own: built once, then timed when told to, so that engines take turns."""
+"""One engine in a process of its own: built once, then timed when told to, so that engines alternate."""
 
 import importlib
 import multiprocessing
@@ -18,7 +18,7 @@ INSTALL = {name: "pip install -e '.[bench]'" for name in ("gsplat-torch", "gspla
 
 
 class Worker:
-    """`ask(what, repeats)` -> list of (wall, CPU) seconds; `facts` is what building told."""
+    """`ask(what, repeats)` -> list of (wall, CPU) seconds; `facts` is what building found out."""
 
     def __init__(self, engine: str, workload: str):
         context = multiprocessing.get_context("spawn")

@@ -89,6 +89,18 @@ def test_keys_are_told_with_default_range_unit_and_meaning(capsys):
     assert 'colour = "white"  # of the last coat (one of white, red)\n' in said
 
 
+def test_the_readme_has_all_keys():
+    """After a change: python -m experiments.keys --into experiments/README.md"""
+    text = (ROOT / "experiments" / "README.md").read_text("utf-8")
+    assert with_keys(text) == text
+
+
+def test_every_key_has_a_meaning(capsys):
+    assert run_listed("experiments", ["keys"]) == 0
+    rows = [line.split(" | ") for line in capsys.readouterr().out.splitlines() if line.startswith("| `")]
+    assert len(rows) > 200 and [row for row in rows if not row[-1].removesuffix(" |")] == []
+
+
 def test_keys_stand_between_the_marks(monkeypatch):
     begin, end = MARKS
     monkeypatch.setattr("experiments.keys._recipes", lambda: {"wall": (WallConfig,), "paint": (PaintConfig,)})
