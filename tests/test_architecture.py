@@ -56,7 +56,6 @@ HOMES = {
     "tensorboardX": ("rein3d_jax/io/files/training_log.py",),
     "embreex": ("rein3d_jax/meshes/ray_caster.py",),
     "bpy": ("experiments/render_rooms/blender/",),  # Blender's own Python
-    "mathutils": ("experiments/render_rooms/blender/",),
     "rich": ("experiments/",),
 }
 

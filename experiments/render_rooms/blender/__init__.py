@@ -1,0 +1,1 @@
+"""What runs inside Blender's own Python: draws planned rooms. Imports bpy, and nothing outside this folder."""
