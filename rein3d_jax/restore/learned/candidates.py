@@ -7,7 +7,7 @@ from flax import struct
 from rein3d_jax.geometry.push_pull import push_pull
 from rein3d_jax.geometry.resample import sample_sphere
 from rein3d_jax.geometry.shell import meet_shell
-from rein3d_jax.geometry.sphere import pixels_from_rays, rays_of_pose, world_from_camera_axes
+from rein3d_jax.geometry.sphere import pixels_from_rays, rays_of_pose, world_from_panorama
 from rein3d_jax.restore.background import OUTSIDE, Background, fill_from_far_side, fill_from_shell
 from rein3d_jax.restore.learned.condition import Clip
 from rein3d_jax.scene import Video
@@ -37,12 +37,7 @@ def clip_of(video: Video, *, observed: float, background: Background | None) -> 
 def positions(world_from_camera: jax.Array) -> jax.Array:
     """Positions (t, 3) of poses (t, 4, 4) in metres from the first, in its own axes: +X lies at its centre column."""
     moved = world_from_camera[:, :3, 3] - world_from_camera[0, :3, 3]
-    return jnp.matmul(moved, _panorama_axes(world_from_camera[0]), precision=jax.lax.Precision.HIGHEST)
-
-
-def _panorama_axes(pose: jax.Array) -> jax.Array:
-    """Rotation (3, 3) of a panorama at `pose`: rows times it are vectors of the world in the panorama's axes."""
-    return jnp.matmul(pose[:3, :3], world_from_camera_axes().T, precision=jax.lax.Precision.HIGHEST)
+    return jnp.matmul(moved, world_from_panorama(world_from_camera[0]), precision=jax.lax.Precision.HIGHEST)
 
 
 def _candidates(rgb, distance, known, pose, anchor: Anchor | None):
@@ -84,6 +79,6 @@ def _open(shape: tuple[int, int], pose: jax.Array, anchor: Anchor) -> jax.Array:
     rays = rays_of_pose(pose, *shape)
     wall, _ = meet_shell(anchor.background.shell, pose[:3, 3], rays)
     moved = pose[:3, 3] + wall[..., None] * rays - origin[:3, 3]
-    moved = jnp.matmul(moved, _panorama_axes(origin), precision=jax.lax.Precision.HIGHEST)
+    moved = jnp.matmul(moved, world_from_panorama(origin), precision=jax.lax.Precision.HIGHEST)
     inverse = sample_sphere(1 / jnp.maximum(distance, 1e-3)[..., None], *pixels_from_rays(moved, *distance.shape))
     return inverse[..., 0] * jnp.linalg.norm(moved, axis=-1) < 1 / _BEYOND

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from rein3d_jax.errors import InputError
 from rein3d_jax.settings import Settings, setting
 
-DTYPES = ("float32", "bfloat16", "float64")  # the last for comparisons, under jax.enable_x64
-KERNELS = ("chunked", "xla", "cudnn")
+_DTYPES = ("float32", "bfloat16", "float64")  # the last for comparisons, under jax.enable_x64
+_KERNELS = ("chunked", "xla", "cudnn")
 _SIZE = "[1, inf)"
 
 
@@ -29,10 +29,10 @@ class DitConfig(Settings):
     patch: tuple[int, int, int] = setting((1, 2, 2), "latents of a token in time, height and width", within=_SIZE)
     epsilon: float = setting(1e-6, "of the norms", within="(0, inf)")
     circular: bool = setting(False, "width RoPE of integer harmonics: a yaw of whole tokens becomes an exact symmetry")
-    dtype: str = setting("bfloat16", "of large matrix products; norms, modulation, rotation: float32", among=DTYPES)
-    param_dtype: str = setting("float32", "of the parameters", among=DTYPES)
+    dtype: str = setting("bfloat16", "of large matrix products; norms, modulation, rotation: float32", among=_DTYPES)
+    param_dtype: str = setting("float32", "of the parameters", among=_DTYPES)
     remat: bool = setting(False, "recompute each block in the backward pass, for memory")
-    kernel: str = setting("chunked", "attention; chunked runs anywhere, cudnn in bfloat16 on NVIDIA's", among=KERNELS)
+    kernel: str = setting("chunked", "attention; chunked runs anywhere, cudnn in bfloat16 on NVIDIA's", among=_KERNELS)
     query_chunk: int = setting(1024, "queries at once in the chunked attention", within=_SIZE)
 
     def __post_init__(self):
@@ -62,8 +62,8 @@ class VaeConfig(Settings):
     blocks: int = setting(2, "residual blocks a stage in the encoder; the decoder has one more", within=_SIZE)
     halve_time: tuple[bool, ...] = setting((False, True, True), "whether the encoder's downsamplings halve time")
     circular: bool = setting(False, "pad the width with the other edge: exactly yaw-equivariant")
-    dtype: str = setting("float32", "of the convolutions", among=DTYPES)
-    param_dtype: str = setting("float32", "of the parameters", among=DTYPES)
+    dtype: str = setting("float32", "of the convolutions", among=_DTYPES)
+    param_dtype: str = setting("float32", "of the parameters", among=_DTYPES)
 
     def __post_init__(self):
         super().__post_init__()

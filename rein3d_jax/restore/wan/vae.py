@@ -25,10 +25,10 @@ class Vae(nn.Module):
     config: VaeConfig
 
     def setup(self):
-        self.encoder = Encoder(self.config)
+        self.encoder = VaeEncoder(self.config)
         self.quant = _dense(self.config, 2 * LATENT)
         self.post_quant = _dense(self.config, LATENT)
-        self.decoder = Decoder(self.config)
+        self.decoder = VaeDecoder(self.config)
 
     def __call__(self, video):
         """The video encoded and decoded; initialises every parameter."""
@@ -49,7 +49,7 @@ class Vae(nn.Module):
         return jnp.clip(self.decoder(self.post_quant(latents)).astype(jnp.float32), -1.0, 1.0)
 
 
-class Encoder(nn.Module):
+class VaeEncoder(nn.Module):
     """Encoder: video to the moments of the latents."""
 
     config: VaeConfig
@@ -69,7 +69,7 @@ class Encoder(nn.Module):
         return _tail(config, _middle(config, x), 2 * LATENT)
 
 
-class Decoder(nn.Module):
+class VaeDecoder(nn.Module):
     """Decoder: latents to video."""
 
     config: VaeConfig
