@@ -19,10 +19,7 @@ from rein3d_jax.settings import Settings, setting
 class CompleteConfig(Settings):
     """The completion's settings: where the pixels of unknown distance are placed."""
 
-    speck: int = setting(
-        4, "radius of the closing whose unknown regions belong to the surface around them", within="[0, inf)",
-        unit="pixels",
-    )  # fmt: skip
+    speck: int = setting(4, "radius of holes that belong to the surface around them", within="[0, inf)", unit="pixels")
     far: float = setting(10.0, "distance of everything else unknown, over the median known distance", within="[1, inf)")
 
 

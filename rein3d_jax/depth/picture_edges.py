@@ -31,7 +31,7 @@ def blur(image: jax.Array, sigma: float) -> jax.Array:
 
 
 def tangent_gradients(image: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """(h, w, c) -> d/d(east), d/d(north), each (h, w, c), per pixel of arc at the equator."""
+    """Gradients (d/d(east), d/d(north)) of (h, w, c), each (h, w, c), per pixel of arc at the equator."""
     east = (jnp.roll(image, -1, axis=1) - jnp.roll(image, 1, axis=1)) / 2
     tall = jnp.pad(image, ((1, 1), (0, 0), (0, 0)), mode="edge")
     north = (tall[:-2] - tall[2:]) / 2
@@ -39,7 +39,7 @@ def tangent_gradients(image: jax.Array) -> tuple[jax.Array, jax.Array]:
 
 
 def edge_tensors(rgb: jax.Array, *, noise: float, texture: float) -> jax.Array:
-    """(h, w, 3) sRGB -> (h, w, 3) saturated structure tensors. `noise` is the step per pixel that counts as
+    """Saturated structure tensors (h, w, 3) of a picture (h, w, 3) sRGB. `noise` is the step per pixel that counts as
     half an edge on flat ground, `texture` how many times its surroundings' mean energy an edge must have."""
     east, north = tangent_gradients(blur(rgb @ jnp.array(OPPONENT).T, 1.0))
     tensor = jnp.stack([east * east, east * north, north * north], axis=-1).sum(axis=-2)
@@ -49,8 +49,8 @@ def edge_tensors(rgb: jax.Array, *, noise: float, texture: float) -> jax.Array:
 
 
 def edge_support(tensors: jax.Array, points: jax.Array, normals: jax.Array) -> jax.Array:
-    """n^T T n at `points` (..., 3) on lines whose planes through the camera have unit `normals` (..., 3):
-    how strongly the picture has an edge there AND along that line -> (...)."""
+    """The support n^T T n (...) at `points` (..., 3) of lines whose planes through the camera have unit `normals` (...,
+    3): how strongly the picture has an edge there AND along that line."""
     ee, en, nn = jnp.moveaxis(sample_sphere(tensors, *pixels_from_rays(points, *tensors.shape[:2])), -1, 0)
     x, y, z = jnp.moveaxis(points, -1, 0)
     squared = x * x + y * y

@@ -16,9 +16,9 @@ _LEVELS = 4  # of each opponent channel
 
 
 def colour_bins(rgb: jax.Array) -> jax.Array:
-    """(h, 2h, 3) sRGB -> (2 ROWS^2, _LEVELS^3): the bin of each pixel of a small picture, one-hot, times its share
-    of the sphere. A bin is a quarter of the spread of luminance and of both chroma channels; a channel with little
-    spread, as in a grey picture, is held to a tenth of the strongest, so that noise stays in one bin."""
+    """Colour bins (2 ROWS^2, 64) of a picture (h, 2h, 3) sRGB: the bin of each pixel of it made small, one-hot, times
+    its share of the sphere. A bin is a quarter of the spread of luminance and of both chroma channels; a channel with
+    little spread, as in a grey picture, is held to a tenth of the strongest, so that noise stays in one bin."""
     small = jax.image.resize(rgb, (ROWS, 2 * ROWS, 3), "linear").reshape(-1, 3) @ jnp.array(OPPONENT).T
     spread = jnp.std(small, axis=0)
     quantiles = norm.cdf((small - jnp.mean(small, axis=0)) / jnp.maximum(spread, 0.1 * jnp.max(spread)))
@@ -28,7 +28,8 @@ def colour_bins(rgb: jax.Array) -> jax.Array:
 
 
 def mutual_information(parts: jax.Array, bins: jax.Array) -> jax.Array:
-    """sum p(a, b) log(p(a, b) / (p(a) p(b))) in nats; `parts` (2 ROWS^2, k) is each pixel's membership of k parts."""
+    """The information sum p(a, b) log(p(a, b) / (p(a) p(b))) in nats; `parts` (2 ROWS^2, k) is each pixel's membership
+    of k parts."""
     joint = parts.T @ bins
     independent = jnp.sum(joint, axis=1, keepdims=True) * jnp.sum(joint, axis=0, keepdims=True)
     # 1e-9 keeps the gradient finite in empty bins, and is a thousandth of a pixel.

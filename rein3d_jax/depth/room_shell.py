@@ -39,27 +39,17 @@ _SIZES = 41  # tried for each box, from 1/e to e times its own
 class RoomShellConfig(Settings):
     """The room fit's settings. Ranges only lean on the fit: rooms may be larger or smaller."""
 
-    camera_height: float = setting(
-        1.6, "height of the camera above the floor, the scale of everything", within="(0, inf)", unit="metres"
-    )
-    wall_range: tuple[float, float] = setting(
-        (0.6, 5.0), "usual distances of walls (1 to 8 m for a camera at 1.6 m)", within="(0, inf)",
-        unit="camera heights",
-    )  # fmt: skip
+    camera_height: float = setting(1.6, "camera's height above the floor: the scale", within="(0, inf)", unit="metres")
+    wall_range: tuple[float, float] = setting((0.6, 5.0), "walls' distances", within="(0, inf)", unit="camera heights")
     ceiling_range: tuple[float, float] = setting(
-        (0.375, 1.6), "usual heights of the ceiling above the camera (0.6 to 2.5 m)", within="(0, inf)",
-        unit="camera heights",
-    )  # fmt: skip
-    max_aspect: float = setting(2.0, "usual length over width of a room, at most", within="[1, inf)")
+        (0.375, 1.6), "ceiling's height above the camera", within="(0, inf)", unit="camera heights"
+    )
+    max_aspect: float = setting(2.0, "room's length over its width", within="[1, inf)")
     prior: float = setting(0.3, "loss of one squared log unit outside the ranges", within="[0, inf)")
     # Nothing stands before a ceiling line; furniture hides floor lines, and doors, windows and cupboards have vertical
     # lines of their own.
-    edge_weights: tuple[float, float, float] = setting(
-        (0.5, 1.0, 0.5), "weights of floor, ceiling and corner lines", within="[0, inf)"
-    )
-    colour_weight: float = setting(
-        0.7, "weight of one nat of mutual information, against full edge support", within="[0, inf)"
-    )
+    edge_weights: tuple[float, float, float] = setting((0.5, 1.0, 0.5), "of floor, ceiling, corner", within="[0, inf)")
+    colour_weight: float = setting(0.7, "weight of a nat of information against edge support", within="[0, inf)")
     noise: float = setting(0.005, "sRGB step per pixel that is half an edge", within="(0, inf)")
     texture: float = setting(1.0, "times its surroundings' mean energy that an edge must have", within="[0, inf)")
     climbers: int = setting(512, "boxes that climb from random starts", within="[1, inf)")
@@ -106,12 +96,13 @@ def fit_room_shell(rgb: jax.Array, *, config: RoomShellConfig) -> tuple[RoomShel
 
 
 def shell_distance(shell: RoomShell, height: int, width: int) -> jax.Array:
-    """(height, width) metres along each pixel's ray to the inside of the box, exact."""
+    """The distance (height, width) in metres along each pixel's ray to the inside of the box, exact."""
     return meet_shell(shell, jnp.zeros(3), pixel_rays(height, width))[0]
 
 
 def _shell_from(params: jax.Array, camera_height: float) -> RoomShell:
-    """(6,): yaw, then the logs of four walls and the ceiling in camera heights; the yaw within 45 degrees."""
+    """The box of (6,) numbers: yaw, then logs of four walls and the ceiling in camera heights; yaw within 45
+    degrees."""
     quarters = jnp.round(params[0] / (jnp.pi / 2))
     walls = jnp.roll(jnp.exp(params[1:5]), quarters.astype(jnp.int32))
     height = jnp.asarray(camera_height, params.dtype)
@@ -165,14 +156,14 @@ def _loss(box: jax.Array, evidence: _Evidence, config: RoomShellConfig) -> tuple
 
 
 def _random_boxes(key: jax.Array, config: RoomShellConfig) -> jax.Array:
-    """(climbers, 6), uniform in yaw and in the logs of the ranges."""
+    """Boxes (climbers, 6), uniform in yaw and in the logs of the ranges."""
     low = jnp.array([-jnp.pi / 4, *jnp.log(jnp.array([config.wall_range[0]] * 4 + [config.ceiling_range[0]]))])
     high = jnp.array([jnp.pi / 4, *jnp.log(jnp.array([config.wall_range[1]] * 4 + [config.ceiling_range[1]]))])
     return jax.random.uniform(key, (config.climbers, 6), minval=low, maxval=high)
 
 
 def _climb(boxes: jax.Array, key: jax.Array, step: jax.Array, evidence: _Evidence, config: RoomShellConfig):
-    """Each box becomes the best of itself and of its children; (n, 6) -> (n, 6), (n,) losses. A child differs in
+    """Boxes (n, 6), each the best of itself and of its children, and their losses (n,). A child differs in
     some of its parts, so that one wrong wall can be mended alone; its lengths tend to change together."""
     parts, whole, chosen = jax.random.split(key, 3)
     noise = jax.random.normal(parts, (config.children, *boxes.shape)).at[..., 0].multiply(_YAW_STEP)
@@ -192,7 +183,7 @@ def _best_size(box: jax.Array, evidence: _Evidence, config: RoomShellConfig) -> 
 
 @partial(jax.jit, static_argnames=("config",))
 def _search(evidence: _Evidence, config: RoomShellConfig) -> jax.Array:
-    """(finalists, 6): the best of many boxes that climbed from random starts, each in its best size."""
+    """The finalists (finalists, 6): the best of many boxes that climbed from random starts, each in its best size."""
     key, start = jax.random.split(jax.random.key(config.seed))
     steps = _STEPS[0] * (_STEPS[1] / _STEPS[0]) ** jnp.linspace(0, 1, config.rounds)
     rounds = (jax.random.split(key, config.rounds), steps)

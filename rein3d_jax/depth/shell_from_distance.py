@@ -18,7 +18,7 @@ _ON_SHELL = 0.05  # relative distance within which a pixel counts as lying on th
 
 
 def _quantiles(values: jax.Array, weights: jax.Array) -> jax.Array:
-    """(2,) the _OUTLIERS and 1 - _OUTLIERS weighted quantiles of (n,)."""
+    """The two weighted quantiles (2,) of values (n,) beyond which outliers lie."""
     order = jnp.argsort(values)
     cumulative = jnp.cumsum(weights[order]) / jnp.sum(weights)
     found = jnp.searchsorted(cumulative, jnp.array([_OUTLIERS, 1 - _OUTLIERS]))
@@ -27,7 +27,7 @@ def _quantiles(values: jax.Array, weights: jax.Array) -> jax.Array:
 
 @jax.jit
 def shell_from_distance(panorama: Panorama) -> tuple[RoomShell, jax.Array]:
-    """(shell, support): support () in [0, 1] is the share of the known sphere that lies on the shell.
+    """The shell, and its support () in [0, 1]: the share of the known sphere that lies on it.
 
     The yaw is the one whose bounding rectangle is smallest, as a box's is along its own axes.
     """

@@ -1,4 +1,4 @@
-"""What a room's shell looks like from inside: its twelve lines, and which part of it each pixel shows."""
+"""A room's shell seen from inside: its twelve lines, and which part of it each pixel shows."""
 
 import jax
 import jax.numpy as jnp
@@ -22,7 +22,7 @@ def shell_edges(shell: RoomShell) -> tuple[jax.Array, jax.Array]:
 
 
 def shell_parts(shell: RoomShell, height: int, width: int) -> jax.Array:
-    """(height, width, 3): how much each pixel shows of the walls, the ceiling, the floor; differentiable."""
+    """The shares (height, width, 3) of walls, ceiling and floor in each pixel; differentiable."""
     x, y, z = jnp.moveaxis(pixel_rays(height, width) @ world_from_shell(shell), -1, 0)
     planes = jnp.concatenate([shell.walls, shell.ceiling[None], shell.floor[None]])
     nearness = jnp.stack([x, y, -x, -y, z, -z], axis=-1) / planes  # 1 / metres, negative behind the ray

@@ -26,7 +26,7 @@ def relative_distance(panorama: Panorama, points: jax.Array) -> jax.Array:
 
 @jax.jit
 def on_observed(panorama: Panorama, points: jax.Array) -> jax.Array:
-    """(...) bool: whether points (..., 3) lie on the surface that `panorama` shows, or before it."""
+    """Whether points (..., 3) lie on the surface that `panorama` shows, or before it: (...) bool."""
     return relative_distance(panorama, points) <= 1 + _MARGIN
 
 

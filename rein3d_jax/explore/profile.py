@@ -26,20 +26,12 @@ class ExploreConfig(Settings):
     stop_buffer: float = setting(0.2, "room left before a surface, b_s", within="[0, inf)", unit="metres")
     step: float = setting(0.25, "way between frames", within="(0, inf)", unit="metres")
     max_frames: int = setting(41, "frames that a path holds; those that do not fit are counted", within="[1, inf)")
-    band: tuple[float, float] = setting(
-        (0.45, 0.55), "rows that hold obstacles: from and to, as shares of the height", within="[0, 1]"
-    )
+    band: tuple[float, float] = setting((0.45, 0.55), "rows of obstacles, as shares of the height", within="[0, 1]")
     viewpoints: int = setting(4, "evaluation viewpoints besides the centre, N_fps", within="[0, inf)")
     viewpoint_samples: int = setting(2000, "Monte Carlo candidates for them, M", within="[1, inf)")
-    min_viewpoint_travel: float = setting(
-        0.1, "directions in which the camera goes less far hold no viewpoint", within="[0, inf)", unit="metres"
-    )
-    max_length: float = setting(
-        math.inf, "length of a path at most; a short one explores locally", within="[0, inf]", unit="metres"
-    )
-    min_revealed: float = setting(
-        0.0, "share of the sphere that a path's end must reveal, or the path is left out", within="[0, 1)"
-    )
+    min_viewpoint_travel: float = setting(0.1, "way to a viewpoint at least", within="[0, inf)", unit="metres")
+    max_length: float = setting(math.inf, "length of a path at most", within="[0, inf]", unit="metres")
+    min_revealed: float = setting(0.0, "share of the sphere that a path's end reveals at least", within="[0, 1)")
 
     def __post_init__(self):
         super().__post_init__()
@@ -60,7 +52,7 @@ def _last_known(profile: jax.Array, known: jax.Array) -> jax.Array:
 
 
 def band_profile(distance: jax.Array, valid: jax.Array, *, config: ExploreConfig) -> jax.Array:
-    """D_raw (w,): least known distance over the band rows of each column (Algorithm 1, lines 1 and 2).
+    """The raw profile D_raw (w,): smallest known distance over each column's band rows (Algorithm 1, lines 1 and 2).
 
     A column with nothing known takes the smaller of its nearest known neighbours, wrapped; with nothing known at all
     the profile is 0, and no path leaves the origin.
@@ -75,7 +67,7 @@ def band_profile(distance: jax.Array, valid: jax.Array, *, config: ExploreConfig
 
 
 def safe_distances(profile: jax.Array, directions: jax.Array, *, config: ExploreConfig) -> jax.Array:
-    """D_safe (n,) for directions (n,): the wrapped minimum filter of a raw profile (w,) (Algorithm 1, line 3).
+    """The safe distance D_safe (n,) in directions (n,): a wrapped minimum filter of D_raw (w,) (Algorithm 1, line 3).
 
     An obstacle at distance D and angle delta from the direction matters when delta <= asin(min(1, R / D)).
     If it does not, the line passes it at D sin(delta) > R, and beyond 90 degrees the path only leaves it.
@@ -95,5 +87,5 @@ def safe_distances(profile: jax.Array, directions: jax.Array, *, config: Explore
 
 
 def travel(safe: jax.Array, *, config: ExploreConfig) -> jax.Array:
-    """l = max(0, D_safe - r_c - b_s), metres (Algorithm 1, line 15; D_usable of Algorithm 2, line 1)."""
+    """The way l = max(0, D_safe - r_c - b_s) in metres (Algorithm 1, line 15; D_usable of Algorithm 2, line 1)."""
     return jnp.maximum(0.0, safe - config.clearance)

@@ -17,7 +17,7 @@ from rein3d_jax.scene import Panorama
 
 @struct.dataclass
 class Trajectories:
-    """tau paths in buffers of f frames; frames from `counts` on repeat the path's last one."""
+    """Paths, tau of them, in buffers of f frames; frames from `counts` on repeat the path's last one."""
 
     positions: jax.Array  # (tau, f, 3) metres, world; frame 0 is the origin
     world_from_camera: jax.Array  # (tau, f, 4, 4) OpenCV axes
@@ -31,13 +31,13 @@ class Trajectories:
 
 
 def _fan(rotation: jax.Array, count: int) -> jax.Array:
-    """(...) -> (..., tau): phi_i = theta + i 2 pi / tau."""
+    """Directions (..., tau) of an even fan: phi_i = theta + i 2 pi / tau."""
     return rotation[..., None] + jnp.arange(count) * (2 * jnp.pi / count)
 
 
 def _best_rotation(raw: jax.Array, config: ExploreConfig) -> jax.Array:
-    """theta* in [0, 2 pi / tau) of the largest sum of D_safe (lines 4 to 11), tried at the resolution of a column;
-    where tau divides the width the directions are column centres."""
+    """The rotation theta* in [0, 2 pi / tau) of the largest sum of D_safe (lines 4 to 11), tried at the resolution of a
+    column; where tau divides the width the directions are column centres."""
     tau = config.trajectories
     tries = math.ceil(raw.shape[0] / tau)  # 1 where there are more trajectories than columns
     rotations = (jnp.arange(tries) + 0.5) * (2 * jnp.pi / (tau * tries))
@@ -49,7 +49,7 @@ def _radial_trajectories(panorama: Panorama, *, config: ExploreConfig = ExploreC
     """The tau paths { k step v | k step <= l }, v = (cos phi, -sin phi, 0), that see the most (Algorithm 1, whole),
     longest first.
 
-    `panorama` (h, w) stands at the origin, unturned. Where the origin has no room the path is the origin alone.
+    `panorama` (h, w) stands at the origin, not rotated. Where the origin has no room the path is the origin alone.
     """
     raw = band_profile(panorama.distance, panorama.valid, config=config)
     rotation = _best_rotation(raw, config)

@@ -21,7 +21,7 @@ class Viewpoints:
 
 
 def _candidates(key: jax.Array, safe: jax.Array, config: ExploreConfig) -> tuple[jax.Array, jax.Array]:
-    """(m, 3) points and (m,) whether they count: r = R_max sqrt(u), uniform in area within a column's sector (lines
+    """Points (m, 3) and whether they count (m,): r = R_max sqrt(u), uniform in area within a column's sector (lines
     2 to 11)."""
     column_key, radius_key = jax.random.split(key)
     column = jax.random.randint(column_key, (config.viewpoint_samples,), 0, safe.shape[0])
@@ -31,8 +31,8 @@ def _candidates(key: jax.Array, safe: jax.Array, config: ExploreConfig) -> tuple
 
 
 def _farthest_points(candidates: jax.Array, usable: jax.Array, count: int) -> tuple[jax.Array, jax.Array]:
-    """(count, 3) points and (count,) valid: each the candidate farthest from the origin and all before (lines 12 to
-    22). A candidate already taken is at distance 0 and is never taken again."""
+    """Points (count, 3) and whether they are valid (count,): each the candidate farthest from the origin and all before
+    (lines 12 to 22). A candidate already taken is at distance 0 and is never taken again."""
 
     def take(nearest: jax.Array, _: None) -> tuple[jax.Array, tuple[jax.Array, jax.Array]]:
         best = jnp.argmax(nearest)
@@ -45,7 +45,7 @@ def _farthest_points(candidates: jax.Array, usable: jax.Array, count: int) -> tu
 
 
 def _evaluation_viewpoints(key: jax.Array, safe: jax.Array, *, config: ExploreConfig = ExploreConfig()) -> Viewpoints:
-    """`config.viewpoints` + 1 level viewpoints, four yaws each, from the safe profile (w,) in metres of
+    """Level viewpoints, `config.viewpoints` + 1 of them, four yaws each, from the safe profile (w,) in metres of
     Trajectories.safe (Algorithm 2, whole). Without usable room only the origin is valid."""
     points, valid = _farthest_points(*_candidates(key, safe, config), config.viewpoints)
     positions = jnp.concatenate([jnp.zeros((1, 3)), points])

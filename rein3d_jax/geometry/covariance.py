@@ -7,5 +7,5 @@ from rein3d_jax.geometry.rotations import matrix_from_quats
 
 
 def scaled_axes(log_scales: jax.Array, quats: jax.Array) -> jax.Array:
-    """M = R S with Sigma = M M^T: (..., 3), (..., 4) -> (..., 3, 3). Columns are the principal semi-axes."""
+    """The principal semi-axes as columns: M = R S with Sigma = M M^T. (..., 3), (..., 4) -> (..., 3, 3)."""
     return matrix_from_quats(quats) * jnp.exp(log_scales)[..., None, :]

@@ -7,7 +7,7 @@ from rein3d_jax.geometry.resample import pad_sphere
 
 
 def window_sum(image: jax.Array, radius: int) -> jax.Array:
-    """(h, w, ...) -> the sum over the (2 radius + 1)^2 pixels around each one."""
+    """The sum over the (2 radius + 1)^2 pixels around each one: (h, w, ...) -> (h, w, ...)."""
     size = 2 * radius + 1
     padded = pad_sphere(image, radius)
     rows = sum(padded[i : i + image.shape[0]] for i in range(size))
@@ -15,6 +15,6 @@ def window_sum(image: jax.Array, radius: int) -> jax.Array:
 
 
 def closing(mask: jax.Array, radius: int) -> jax.Array:
-    """(h, w) bool: `mask` and the gaps that no open square of side 2 radius + 1 fits into."""
+    """The closing of a mask (h, w) bool: it and the gaps that no open square of side 2 radius + 1 fits into."""
     dilated = window_sum(mask.astype(jnp.float32), radius) > 0
     return mask | (window_sum((~dilated).astype(jnp.float32), radius) == 0)

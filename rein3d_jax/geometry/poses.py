@@ -9,22 +9,22 @@ from rein3d_jax.scene import Camera
 
 
 def rigid(rotation: jax.Array, translation: jax.Array) -> jax.Array:
-    """(..., 3, 3), (..., 3) -> (..., 4, 4)."""
+    """The pose (..., 4, 4) of a rotation (..., 3, 3) and a translation (..., 3)."""
     top = jnp.concatenate([rotation, translation[..., None]], axis=-1)
     bottom = jnp.broadcast_to(jnp.array([0.0, 0.0, 0.0, 1.0], top.dtype), (*top.shape[:-2], 1, 4))
     return jnp.concatenate([top, bottom], axis=-2)
 
 
 def invert(pose: jax.Array) -> jax.Array:
-    """b_from_a (..., 4, 4) -> a_from_b."""
+    """The inverse a_from_b of b_from_a (..., 4, 4), which is rigid."""
     rotation = jnp.swapaxes(pose[..., :3, :3], -1, -2)
     moved = jnp.einsum("...ij,...j->...i", rotation, pose[..., :3, 3], precision=jax.lax.Precision.HIGHEST)
     return rigid(rotation, -moved)
 
 
 def upright(position: jax.Array, yaw: jax.Array = 0.0, pitch: jax.Array = 0.0) -> jax.Array:
-    """world_from_camera (4, 4) of an OpenCV camera at `position` (3,) that looks along +X when yaw and
-    pitch are 0; yaw turns left, pitch looks up (radians)."""
+    """The pose world_from_camera (4, 4) of an OpenCV camera at `position` (3,) that faces +X when yaw and pitch are 0;
+    positive yaw is to the left, positive pitch up (radians)."""
     yaw, pitch = jnp.asarray(yaw, jnp.float32), jnp.asarray(pitch, jnp.float32)
     forward = jnp.stack([jnp.cos(yaw) * jnp.cos(pitch), jnp.sin(yaw) * jnp.cos(pitch), jnp.sin(pitch)])
     right = jnp.stack([jnp.sin(yaw), -jnp.cos(yaw), jnp.zeros_like(yaw)])

@@ -12,16 +12,16 @@ import jax.numpy as jnp
 from rein3d_jax.geometry.pyramid import blocks, double, levels
 from rein3d_jax.geometry.resample import pad_sphere
 
-NEARER = 12.0  # how sharply a cell loses trust per e-fold that it is nearer than its background
+_NEARER = 12.0  # how sharply a cell loses trust per e-fold that it is nearer than its background
 # A surface seen at a slant changes distance from cell to cell; so much is not yet "nearer" (relative, and per pixel of
 # cell size: on a floor 1.6 m below, 4 m away and 128 rows to the panorama, a row is 6 % of the distance).
-TOLERANCE, TOLERANCE_PER_PIXEL = 0.1, 0.02
+_TOLERANCE, _TOLERANCE_PER_PIXEL = 0.1, 0.02
 
 
 def push_pull(
     image: jax.Array, weight: jax.Array, *, otherwise: jax.Array | None = None, prefer_far: bool = False
 ) -> jax.Array:
-    """(h, w, c), weight (h, w) in [0, 1] -> (h, w, c): `image` where the weight is 1, filled where it is 0.
+    """The filled image: (h, w, c), weight (h, w) in [0, 1] -> (h, w, c), `image` where the weight is 1.
 
     `otherwise` (c,) is what an image without any weight becomes; None: its weighted mean, 0.
     """
@@ -43,10 +43,10 @@ def push_pull(
 
 
 def _trust(inverse, background, level):
-    """In [0, 1]: 1 unless `inverse` distance says nearer than `background` by more than the tolerance."""
-    tolerance = TOLERANCE + TOLERANCE_PER_PIXEL * 2**level
+    """The trust in [0, 1]: 1 unless `inverse` distance says nearer than `background` by more than the tolerance."""
+    tolerance = _TOLERANCE + _TOLERANCE_PER_PIXEL * 2**level
     excess = jnp.log(jnp.maximum(inverse, 1e-6)) - jnp.log(jnp.maximum(background, 1e-6)) - tolerance
-    return jnp.exp(-NEARER * jnp.maximum(excess, 0.0))
+    return jnp.exp(-_NEARER * jnp.maximum(excess, 0.0))
 
 
 def _double_far(image, level):

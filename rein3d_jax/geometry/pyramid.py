@@ -7,7 +7,7 @@ from rein3d_jax.geometry.resample import pad_sphere
 
 
 def levels(height: int) -> int:
-    """How often `height` (and with it the width, twice that) can be halved, leaving at least 2 rows."""
+    """The number of times that `height` (and with it the width, twice that) can be halved, leaving at least 2 rows."""
     count = 0
     while height % 2 == 0 and height > 2:
         height, count = height // 2, count + 1
@@ -15,14 +15,15 @@ def levels(height: int) -> int:
 
 
 def blocks(image: jax.Array) -> jax.Array:
-    """(h, w, ...) -> (h / 2, w / 2, 4, ...): the 2 x 2 pixels under each pixel of the next level."""
+    """The 2 x 2 pixels under each pixel of the next level: (h, w, ...) -> (h / 2, w / 2, 4, ...)."""
     height, width = image.shape[:2]
     split = image.reshape(height // 2, 2, width // 2, 2, *image.shape[2:])
     return jnp.moveaxis(split, 2, 1).reshape(height // 2, width // 2, 4, *image.shape[2:])
 
 
 def double(image: jax.Array) -> jax.Array:
-    """(h, w, ...) -> (2 h, 2 w, ...), bilinear: weights 3/4 and 1/4, as the new centres lie."""
+    """The image at twice the size, bilinear: weights 3/4 and 1/4, as the new centres lie. (h, w, ...) -> (2 h, 2 w,
+    ...)."""
     height, width = image.shape[:2]
     padded = pad_sphere(image, 1)
     middle = padded[1:-1]

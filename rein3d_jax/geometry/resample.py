@@ -11,8 +11,8 @@ from rein3d_jax.scene import Camera
 
 
 def pad_sphere(image: jax.Array, pad: int) -> jax.Array:
-    """(h, w, ...) -> (h + 2 pad, w + 2 pad, ...): wraps columns; a row beyond a pole is the row this side
-    of it, turned by half a revolution."""
+    """The image with a rim: (h, w, ...) -> (h + 2 pad, w + 2 pad, ...). Columns wrap; a row beyond a pole is the row on
+    this side of it, rotated by half a circle."""
     over_pole = jnp.roll(image, image.shape[1] // 2, axis=1)
     tall = jnp.concatenate([over_pole[:pad][::-1], image, over_pole[image.shape[0] - pad :][::-1]], axis=0)
     return jnp.concatenate([tall[:, tall.shape[1] - pad :], tall, tall[:, :pad]], axis=1)
@@ -36,6 +36,6 @@ def perspective_crop(image: jax.Array, world_from_panorama: jax.Array, camera: C
     exact = partial(jnp.matmul, precision=jax.lax.Precision.HIGHEST)  # an accelerator's default is 10 bits
     rotation = exact(world_from_panorama[:3, :3].T, camera.world_from_camera[:3, :3])
     rays = exact(pinhole_rays(camera.height, camera.width, camera.focal, camera.centre), rotation.T)
-    # pixels_from_rays speaks of an unturned panorama's world axes: +X is camera +z, +Y is -x, +Z is -y.
+    # pixels_from_rays speaks of the world axes of a panorama that is not rotated: +X is camera +z, +Y is -x, +Z is -y.
     rays = jnp.stack([rays[..., 2], -rays[..., 0], -rays[..., 1]], axis=-1)
     return sample_sphere(image, *pixels_from_rays(rays, image.shape[0], image.shape[1]))

@@ -9,7 +9,7 @@ from rein3d_jax.geometry.safe import safe_norm
 
 
 def normalize_quats(quats: jax.Array | np.ndarray) -> jax.Array | np.ndarray:
-    """(..., 4) -> (..., 4) unit; the zero quaternion, which names no rotation, becomes the identity."""
+    """Unit quaternions (..., 4); the zero quaternion, which names no rotation, becomes the identity."""
     assert quats.shape[-1] == 4, quats.shape
     xp, norm = array_namespace(quats), safe_norm(quats, keepdims=True)
     identity = xp.array([1.0, 0.0, 0.0, 0.0], quats.dtype)
@@ -17,7 +17,7 @@ def normalize_quats(quats: jax.Array | np.ndarray) -> jax.Array | np.ndarray:
 
 
 def matrix_from_quats(quats: jax.Array) -> jax.Array:
-    """(..., 4) wxyz of any length -> (..., 3, 3)."""
+    """Rotation matrices (..., 3, 3) of quaternions (..., 4) wxyz of any length."""
     w, x, y, z = jnp.moveaxis(normalize_quats(quats), -1, 0)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -28,7 +28,7 @@ def matrix_from_quats(quats: jax.Array) -> jax.Array:
 
 
 def quats_from_matrix(matrix: jax.Array | np.ndarray) -> jax.Array | np.ndarray:
-    """(..., 3, 3) rotations -> (..., 4) unit wxyz, of either sign, in the precision of `matrix`. Of the four ways to
+    """Unit quaternions (..., 4) wxyz, of either sign, of rotations (..., 3, 3), in their precision. Of the four ways to
     write it, the one that divides by the largest component (Shepperd 1978)."""
     xp = array_namespace(matrix)
     m = [[matrix[..., i, j] for j in range(3)] for i in range(3)]
@@ -44,23 +44,8 @@ def quats_from_matrix(matrix: jax.Array | np.ndarray) -> jax.Array | np.ndarray:
     return normalize_quats(xp.take_along_axis(rows, largest[..., None, None], axis=-2)[..., 0, :])
 
 
-def multiply_quats(left: jax.Array, right: jax.Array) -> jax.Array:
-    """Hamilton product: (..., 4), (..., 4) -> (..., 4); rotates by `right` first."""
-    lw, lx, ly, lz = jnp.moveaxis(left, -1, 0)
-    rw, rx, ry, rz = jnp.moveaxis(right, -1, 0)
-    return jnp.stack(
-        [
-            lw * rw - lx * rx - ly * ry - lz * rz,
-            lw * rx + lx * rw + ly * rz - lz * ry,
-            lw * ry - lx * rz + ly * rw + lz * rx,
-            lw * rz + lx * ry - ly * rx + lz * rw,
-        ],
-        axis=-1,
-    )
-
-
 def yaw_quat(angle: jax.Array) -> jax.Array:
-    """Turn LEFT by `angle` radians about +Z (right-handed): () -> (4,)."""
+    """The rotation to the LEFT by `angle` radians about +Z (right-handed): () -> (4,) wxyz."""
     angle = jnp.asarray(angle, jnp.float32)
     zero = jnp.zeros_like(angle)
     return jnp.stack([jnp.cos(angle / 2), zero, zero, jnp.sin(angle / 2)], axis=-1)

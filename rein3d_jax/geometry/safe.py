@@ -8,7 +8,7 @@ from rein3d_jax.geometry.array_namespace import array_namespace
 
 
 def safe_norm(x: jax.Array | np.ndarray, *, axis: int = -1, keepdims: bool = False) -> jax.Array | np.ndarray:
-    """Euclidean norm with gradient 0 (not NaN) at x = 0."""
+    """The Euclidean norm, with gradient 0 (not NaN) at x = 0."""
     xp = array_namespace(x)
     squared = xp.sum(x * x, axis=axis, keepdims=keepdims)
     positive = squared > 0
@@ -16,6 +16,6 @@ def safe_norm(x: jax.Array | np.ndarray, *, axis: int = -1, keepdims: bool = Fal
 
 
 def safe_divide(numerator: jax.Array, denominator: jax.Array, *, otherwise: float = 0.0) -> jax.Array:
-    """numerator / denominator, and `otherwise` with gradient 0 where the denominator is 0."""
+    """The quotient, and `otherwise` with gradient 0 where the denominator is 0."""
     zero = denominator == 0
     return jnp.where(zero, otherwise, numerator / jnp.where(zero, 1.0, denominator))

@@ -13,24 +13,25 @@ FACES = 6  # +x, +y, -x, -y in the box's own axes, then ceiling, floor
 class RoomShell:
     """An upright box around the origin, in the world frame."""
 
-    yaw: jax.Array  # () radians the box is turned LEFT
-    walls: jax.Array  # (4,) metres to the walls at yaw + 0, 90, 180, 270 degrees, turning left
+    yaw: jax.Array  # () radians by which the box is rotated LEFT
+    walls: jax.Array  # (4,) metres to the walls at yaw + 0, 90, 180, 270 degrees, counted to the left
     floor: jax.Array  # () metres below the origin, positive
     ceiling: jax.Array  # () metres above the origin, positive
 
 
 def world_from_shell(shell: RoomShell) -> jax.Array:
-    """(3, 3) rotation."""
+    """The rotation (3, 3) from the box's own axes to the world."""
     return matrix_from_quats(yaw_quat(shell.yaw))
 
 
 def _bounds(shell: RoomShell) -> jax.Array:
-    """(6,) metres from the origin to each face."""
+    """Metres (6,) from the origin to each face."""
     return jnp.concatenate([shell.walls, shell.ceiling[None], shell.floor[None]])
 
 
 def meet_shell(shell: RoomShell, origin: jax.Array, rays: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Rays (..., 3), unit, world frame, from `origin` (3,) -> (distance (...) metres, face (...) int), exact.
+    """(distance (...) metres, face (...) int) at which unit rays (..., 3) from `origin` (3,), world frame, meet the
+    shell.
 
     From a point outside a face the distance to that face is 0: such a point has left the room."""
     rotation = world_from_shell(shell)

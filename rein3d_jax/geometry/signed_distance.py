@@ -1,5 +1,5 @@
 """Truncated signed distance fields fused from panoramas (Curless and Levoy 1996): positive in free space, negative
-behind a surface, unknown where no panorama looked."""
+behind a surface, unknown where no panorama saw."""
 
 import jax
 import jax.numpy as jnp
@@ -23,18 +23,18 @@ class Field:
 
     @property
     def known(self) -> jax.Array:
-        """(x, y, z) bool: some panorama looked there."""
+        """The samples (x, y, z) bool that some panorama saw."""
         return self.sums[..., 1] > 0
 
     @property
     def signed(self) -> jax.Array:
-        """(x, y, z) metres, at most TRUNCATION voxels; free where unknown."""
+        """Signed distances (x, y, z) metres, at most TRUNCATION voxels; free where unknown."""
         mean = self.sums[..., 0] / jnp.maximum(self.sums[..., 1], 1.0)
         return jnp.where(self.known, mean, TRUNCATION) * self.voxel
 
     @property
     def rgb(self) -> jax.Array:
-        """(x, y, z, 3) sRGB, black away from surfaces."""
+        """Colours (x, y, z, 3) sRGB, black away from surfaces."""
         return self.sums[..., 2:5] / jnp.maximum(self.sums[..., 5:], 1.0)
 
 

@@ -2,7 +2,7 @@
 pixel-sized ones at edges and on texture.
 
 A leaf of the partition becomes one Gaussian with the leaf's mean colour. Its middle lies on the leaf's plane, its axes
-along it, and from where it was lifted it looks as wide and high as the leaf's pixels would together: the variance of a
+along it, and from where it was lifted it covers as much as the leaf's pixels would together: the variance of a
 pixel's splat, and of the places of the pixels that it stands for.
 """
 
@@ -17,9 +17,8 @@ from rein3d_jax.geometry.rotations import quats_from_matrix
 from rein3d_jax.geometry.safe import safe_norm
 from rein3d_jax.geometry.sphere import pixel_rays, world_from_panorama
 from rein3d_jax.geometry.spherical_harmonics import sh_from_rgb
-from rein3d_jax.lift.edges import snap_edges
 from rein3d_jax.lift.leaf_cost import largest_side, leaf_costs
-from rein3d_jax.lift.lift import LiftConfig, footprint_sigma, lift
+from rein3d_jax.lift.lift import LiftConfig, footprint_sigma, lift, with_steps
 from rein3d_jax.lift.partition import Leaves, partition
 from rein3d_jax.lift.surface import axes_at, slopes
 from rein3d_jax.scene import Gaussians, Panorama
@@ -59,12 +58,9 @@ def lift_adaptively(
 
 @partial(jax.jit, static_argnums=1)
 def _prepared(panorama: Panorama, config: LiftConfig) -> tuple[jax.Array, jax.Array]:
-    """(distances with steps where they were blurred, 1 where unknown; where they are known)."""
+    """Distances with steps where they were blurred, 1 where unknown; and where they are known."""
     known = panorama.valid & (panorama.distance > 0)
-    distance = jnp.where(known, panorama.distance, 1.0)
-    if config.snap_edges:
-        distance = snap_edges(distance, known, ramp=config.edge_ramp, step=config.edge_step, slope=config.edge_slope)
-    return distance, known
+    return with_steps(jnp.where(known, panorama.distance, 1.0), known, config), known
 
 
 @partial(jax.jit, static_argnums=5)
@@ -91,7 +87,8 @@ def _gaussians_of(leaves: Leaves, rgb, distance, known, world_from_camera, confi
 
 
 def _means(leaves: Leaves, capacity: int):
-    """(what takes the mean of (h, w, ...) over each leaf, 0 where there is none; (capacity,) whether there is one)."""
+    """A function that takes the mean of (h, w, ...) over each leaf, 0 where there is none; (capacity,) whether there
+    is."""
     label = leaves.label.ravel()
 
     def total(x):
@@ -102,7 +99,7 @@ def _means(leaves: Leaves, capacity: int):
 
 
 def _shape(middle: jax.Array, slope: jax.Array, sides: jax.Array, pitch: float, config: LiftConfig):
-    """((n, 3, 3) axes as columns, (n, 3) their sigmas in metres) of leaves of `sides` (rows, columns) pixels.
+    """Axes (n, 3, 3) as columns and their sigmas (n, 3) in metres, of leaves of `sides` (rows, columns) pixels.
 
     Seen from the origin sigma^2 is a pixel's plus that of a leaf's places, both times its distance: a side of n pixels
     has (n^2 - 1) / 12 of them, and rho^2 (n^2 - 1) holds rho = 0.6 for pixels and leaves alike. On the surface the axes
@@ -126,7 +123,7 @@ def _shape(middle: jax.Array, slope: jax.Array, sides: jax.Array, pitch: float, 
 
 
 def _ellipse(xx: jax.Array, yy: jax.Array, xy: jax.Array):
-    """((n, 2, 2) rotations, the two sigmas along their columns) of covariances."""
+    """Rotations (n, 2, 2) and the two sigmas along their columns, of covariances."""
     lean = jnp.stack([(xx - yy) / 2, xy], axis=-1)
     spread, middle = safe_norm(lean), (xx + yy) / 2
     angle = jnp.where(spread > 1e-6 * middle, jnp.arctan2(xy, lean[:, 0]) / 2, 0.0)

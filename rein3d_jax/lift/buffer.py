@@ -22,7 +22,8 @@ def with_capacity(gaussians: Gaussians, capacity: int) -> Gaussians:
 
 
 def _merge(scene: Gaussians, new: Gaussians) -> tuple[Gaussians, jax.Array]:
-    """(scene with the alive ones of `new` in its first dead slots, how many found none). Both of the same degree."""
+    """The scene with the alive ones of `new` in its first dead slots, and how many found none. Both of the same
+    degree."""
     count, room = scene.alive.shape[0], new.alive.shape[0]
     free = jnp.nonzero(~scene.alive, size=room, fill_value=count)[0]
     rank = jnp.cumsum(new.alive) - 1
@@ -36,5 +37,5 @@ merge = jax.jit(_merge)
 
 def compact(scene: Gaussians, *, spare: float = 0.0) -> Gaussians:
     """The living ones in their order, in a buffer of that size plus a share of `spare` dead slots. Outside jit."""
-    kept = jax.tree.map(lambda x: x[scene.alive], scene)
-    return with_capacity(kept, int(kept.alive.shape[0] * (1 + spare)))
+    living = jax.tree.map(lambda x: x[scene.alive], scene)
+    return with_capacity(living, int(living.alive.shape[0] * (1 + spare)))

@@ -48,7 +48,7 @@ def _peaks(inverse: jax.Array, valid: jax.Array, ramp: int, slope: float) -> jax
 
 
 def _climb_by_width(inverse: jax.Array, excess: jax.Array, ramp: int, step: float) -> jax.Array:
-    """(2 ramp + 2,) relative climb that the steps of so many links do together."""
+    """The relative climb (2 ramp + 2,) that the steps of so many links do together."""
     ones = jnp.ones_like(excess)
     climb, width = (_run(excess, x, 1, ramp) + _run(excess, x, -1, ramp) - x for x in (excess, ones))
     counts = (excess != 0) & (jnp.abs(climb) > step * inverse)
@@ -77,7 +77,7 @@ def _snap_circles(inverse: jax.Array, valid: jax.Array, ramp: int, step: float, 
 
 
 def _meridians(image: jax.Array) -> jax.Array:
-    """(h, w) -> (w / 2, 2 h): each column, down over the pole and up the opposite column."""
+    """Circles (w / 2, 2 h) of an image (h, w): each column, down over the pole and up the opposite column."""
     half = image.shape[1] // 2
     return jnp.concatenate([image[:, :half], image[::-1, half:]], axis=0).T
 

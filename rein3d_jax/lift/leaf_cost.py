@@ -31,7 +31,7 @@ def leaf_costs(rgb: jax.Array, distance: jax.Array, wanted: jax.Array, *, config
 
 @partial(jax.jit, static_argnums=3)
 def _pixels(rgb: jax.Array, distance: jax.Array, wanted: jax.Array, config: LiftConfig):
-    """(PlaneMoments of colour and inverse distance, what no leaf may span, area) of each pixel."""
+    """PlaneMoments of colour and inverse distance, what no leaf may span, and area, of each pixel."""
     apart = ~wanted | beside_steps(1 / distance, config.leaf_step)
     area = jnp.broadcast_to(jnp.cos(latitudes(len(rgb)))[:, None], distance.shape)
     return of_pixels(jnp.concatenate([rgb, 1 / distance[..., None]], axis=-1)), apart, area
@@ -39,7 +39,7 @@ def _pixels(rgb: jax.Array, distance: jax.Array, wanted: jax.Array, config: Lift
 
 @partial(jax.jit, static_argnums=(1, 2))
 def _level(below, level: Level, config: LiftConfig):
-    """(The same of `level`'s cells, their costs) from cells of half the width, or height where they are one wide."""
+    """The same of `level`'s cells, and their costs, from cells of half the width, or height where they are one wide."""
     axis = 1 if level[1] else 0
     shape = (1 << level[0], 1 << level[1])
     half = (shape[0], shape[1] // 2) if axis else (shape[0] // 2, shape[1])
@@ -78,8 +78,8 @@ def _touching(apart: jax.Array, shape: tuple[int, int]) -> jax.Array:
 
 
 def beside_steps(inverse: jax.Array, step: float) -> jax.Array:
-    """(h, w) bool: a neighbour's inverse distance differs by a slope of which those before and after know nothing,
-    `step` relative to the nearer surface."""
+    """Pixels (h, w) bool beside a step: a neighbour's inverse distance differs by a slope of which those before and
+    after know nothing, `step` relative to the nearer surface."""
     image = pad_sphere(inverse, 2)
     right = _steps(image[2:-2], 1, step)
     down = _steps(image[:, 2:-2], 0, step)

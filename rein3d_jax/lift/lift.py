@@ -2,7 +2,7 @@
 
 Centre by back-projection, colour from the pixel, size from the pixel's footprint on the sphere at its distance, high
 opacity. The paper's splats are balls, and gaps open between them where a surface that was seen at a slant is seen from
-elsewhere. Ours lie along the surface, stretched so that from where they were lifted they look as round as balls.
+elsewhere. Ours lie along the surface, stretched so that from where they were lifted they are as round as balls.
 Everything scales with the distance; nothing here is in absolute metres.
 """
 
@@ -25,43 +25,35 @@ from rein3d_jax.settings import Settings, setting
 class LiftConfig(Settings):
     """The lift's settings: how a panorama becomes Gaussians."""
 
-    capacity: int = setting(
-        0, "slots of the scene's buffer; 0: twice the lifted pixels, room for what exploring adds", within="[0, inf)"
-    )
+    capacity: int = setting(0, "slots for Gaussians; 0: twice the lifted ones, room to explore", within="[0, inf)")
     opacity: float = setting(0.99, "opacity of every Gaussian", within="(0, 1)")
     footprint: float = setting(0.85, "sigma over half the diagonal of a pixel's footprint", within="(0, inf)")
-    steepest: float = setting(
-        6.0, "tangent of incidence up to which a splat is stretched along its surface; 0: never", within="[0, inf)"
-    )
+    steepest: float = setting(6.0, "tangent of incidence up to which splats are stretched; 0: never", within="[0, inf)")
     thickness: float = setting(0.3, "a splat's extent across its surface, over its width", within="(0, inf)")
-    share: float = setting(
-        1.0, "Gaussians per pixel at most, larger where picture and surface are smooth; 1: one for each pixel",
-        within="(0, 1]",
-    )  # fmt: skip
-    max_leaf_side: int = setting(
-        16, "pixels along a side that one Gaussian stands for at most, a power of 2; for a share below 1",
-        within="[1, inf)", unit="pixels",
-    )  # fmt: skip
-    flatness: float = setting(
-        0.003, "relative distance by which a surface may stray from its Gaussian's plane; for a share below 1",
-        within="[0, inf)",
-    )  # fmt: skip
-    leaf_step: float = setting(
-        0.05, "relative step of inverse distance that no Gaussian spans; for a share below 1", within="[0, inf)"
-    )
+    share: float = setting(1.0, "Gaussians for each pixel at most, larger ones where it is smooth", within="(0, 1]")
+    # The next three are for a share below 1.
+    max_leaf_side: int = setting(16, "side of what one Gaussian stands for at most", within="[1, inf)", unit="pixels")
+    flatness: float = setting(0.003, "relative distance of a surface from its Gaussian's plane", within="[0, inf)")
+    leaf_step: float = setting(0.05, "relative step of inverse distance that no Gaussian spans", within="[0, inf)")
     snap_edges: bool = setting(True, "make the blurred ramps of a distance map's edges steps again")
     # At 256 x 512, 24 links hold a step blurred by a Gaussian of 3 pixels (4 % of the pixels off both surfaces before,
     # none after; with 16 links still 4 %). The price on exact, furnished rooms of that size: 1.2 % of the pixels move
     # by more than 2 % (faces seen nearly edge-on); 1.0 % with 16 links.
     edge_ramp: int = setting(24, "width of the widest ramp that is made a step", within="[1, inf)", unit="pixels")
     edge_step: float = setting(0.1, "relative change of distance across an edge, at least", within="[0, inf)")
-    edge_slope: float = setting(
-        0.01, "relative change per pixel below which the surface beside the ramp is reached", within="[0, inf)"
-    )
+    edge_slope: float = setting(0.01, "relative change per pixel of the surfaces beside a ramp", within="[0, inf)")
+
+
+def with_steps(distance: jax.Array, known: jax.Array, config: LiftConfig) -> jax.Array:
+    """The distance (h, w) with its blurred edges made steps, if the config says so."""
+    if not config.snap_edges:
+        return distance
+    return snap_edges(distance, known, ramp=config.edge_ramp, step=config.edge_step, slope=config.edge_slope)
 
 
 def footprint_sigma(distance: jax.Array, row_pitch: float, latitude: jax.Array, footprint: float) -> jax.Array:
-    """sigma = footprint * half the diagonal of a footprint `distance * pitch` high and cos(latitude) times as wide.
+    """A splat's sigma = footprint * half the diagonal of a footprint `distance * pitch` high and cos(latitude) times as
+    wide.
 
     Half the diagonal is how far the splat must reach (its pixel's corner), so it follows the shrinking of a row but
     not to 0, where rows stay a pitch apart. Least alpha at pixel corners within 15 degrees of a floor's pole, seen
@@ -87,9 +79,7 @@ def _lift(
     assert panorama.rgb.shape == (height, width, 3), panorama.rgb.shape
     assert select.shape == panorama.valid.shape == (height, width), (select.shape, panorama.valid.shape)
     known = panorama.valid & (panorama.distance > 0)
-    distance = panorama.distance
-    if config.snap_edges:
-        distance = snap_edges(distance, known, ramp=config.edge_ramp, step=config.edge_step, slope=config.edge_slope)
+    distance = with_steps(panorama.distance, known, config)
     alive = (select & known).ravel()
     slope = slopes(distance, known)
     slope *= jnp.minimum(1.0, config.steepest / jnp.maximum(safe_norm(slope, keepdims=True), 1e-6))

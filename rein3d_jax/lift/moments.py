@@ -78,7 +78,7 @@ def _three(x: jax.Array, axis: int) -> list[jax.Array]:
 
 
 def plane_residual(cells: PlaneMoments, shape: tuple[int, int]) -> tuple[jax.Array, jax.Array]:
-    """(mean square that the plane of best fit leaves, mean square that its tilt explains) of rectangles of `shape`."""
+    """Mean squares, of rectangles of `shape`, that the plane of best fit leaves and that its tilt explains."""
     rows, columns = shape
     size = rows * columns
     tilt = cells.across**2 * (12 / (size * max(columns**2 - 1, 1)))  # sum of (column - middle)^2 = size (n^2 - 1) / 12

@@ -51,7 +51,8 @@ def _pair_sum(x: jax.Array, axis: int) -> jax.Array:
 
 
 def _plan(cost: dict[Level, jax.Array], some: dict[Level, jax.Array], price: jax.Array):
-    """(for each rectangle 0: a leaf, 1: halved across rows, 2: across columns; how many leaves in all)."""
+    """The choice for each rectangle (0: a leaf, 1: halved across rows, 2: across columns), and how many leaves in
+    all."""
     value, choice, count = {}, {}, {}
     for level in sorted(cost):
         best, number = cost[level] + price * some[level], some[level].astype(jnp.float32)
@@ -72,11 +73,11 @@ def _read(choice: dict[Level, jax.Array], wanted: jax.Array, capacity: int) -> L
     log_sides = jnp.zeros((*wanted.shape, 2), jnp.int32)
     for level in sorted(choice, reverse=True):
         here, chosen = reached[level], choice[level]
-        leaf = _repeat(_repeat(here & (chosen == 0), 0, 1 << level[0]), 1, 1 << level[1])
+        leaf = jnp.repeat(jnp.repeat(here & (chosen == 0), 1 << level[0], axis=0), 1 << level[1], axis=1)
         log_sides = jnp.where(leaf[..., None], jnp.array(level), log_sides)
         for axis, below in ((1, (level[0], level[1] - 1)), (0, (level[0] - 1, level[1]))):
             if below in reached:
-                reached[below] |= _repeat(here & (chosen == 1 + axis), axis, 2)
+                reached[below] |= jnp.repeat(here & (chosen == 1 + axis), 2, axis=axis)
     row, column = jnp.arange(wanted.shape[0])[:, None], jnp.arange(wanted.shape[1])[None]
     first = (row >> log_sides[..., 0] << log_sides[..., 0], column >> log_sides[..., 1] << log_sides[..., 1])
     head = (first[0] == row) & (first[1] == column)
@@ -90,7 +91,3 @@ def _read(choice: dict[Level, jax.Array], wanted: jax.Array, capacity: int) -> L
 def _wanted_leaf(wanted: jax.Array, first: tuple[jax.Array, jax.Array], head: jax.Array) -> jax.Array:
     """Whether any pixel of the leaf that starts here is wanted."""
     return head & jnp.zeros(wanted.shape, bool).at[first].max(wanted)
-
-
-def _repeat(x: jax.Array, axis: int, times: int) -> jax.Array:
-    return jnp.repeat(x, times, axis=axis)

@@ -17,7 +17,7 @@ from rein3d_jax.geometry.sphere import latitudes, pixel_rays
 
 
 def slopes(distance: jax.Array, known: jax.Array) -> jax.Array:
-    """(h, w, 2) of distances (h, w): w towards growing columns, and upward. 0 beside what is not known."""
+    """The slope w (h, w, 2) of distances (h, w), towards growing columns and upward; 0 beside what is not known."""
     height = distance.shape[0]
     inverse = jnp.where(known, 1 / jnp.where(known, distance, 1.0), 0.0)
     image = pad_sphere(jnp.stack([inverse, known.astype(inverse.dtype)], axis=-1), 1)
@@ -37,18 +37,18 @@ def _limited(before: jax.Array, here: jax.Array, after: jax.Array) -> jax.Array:
 
 
 def surface_axes(slope: jax.Array, height: int, width: int) -> tuple[jax.Array, jax.Array]:
-    """((h, w, 3, 3) orthonormal axes as columns, in a panorama's own frame; (h, w) tangent of incidence).
+    """Orthonormal axes (h, w, 3, 3) as columns, in a panorama's own frame, and tangents of incidence (h, w).
 
     The first axis runs along the surface where it falls away most, the second across it, the third is its normal. Seen
-    from the panorama's centre, a disc stretched along the first by sqrt(1 + tangent^2) looks round.
+    from the panorama's centre, a disc stretched along the first by sqrt(1 + tangent^2) is round.
     """
     axes, steep, _ = axes_at(pixel_rays(height, width), slope)
     return axes, steep
 
 
 def axes_at(ray: jax.Array, slope: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """(`surface_axes` of rays (..., 3) with slopes (..., 2); tangents of incidence; the unit vector (..., 2), towards
-    growing columns and upward, of the way in which the surface falls away)."""
+    """The axes of `surface_axes` at rays (..., 3) with slopes (..., 2); tangents of incidence; the unit vector (...,
+    2), towards growing columns and upward, along which the surface falls away."""
     steep = safe_norm(slope)
     some = steep > 1e-6
     way = jnp.where(some[..., None], slope / jnp.where(some, steep, 1.0)[..., None], jnp.array([1.0, 0.0]))

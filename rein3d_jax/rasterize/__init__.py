@@ -1,7 +1,7 @@
 """Gaussians + cameras -> colour, alpha, distance: project, tile, composite; reference.py is the slow dense oracle."""
 
 from rein3d_jax.rasterize.config import RasterizeConfig
-from rein3d_jax.rasterize.contribution import accumulated_weight, median_distance
+from rein3d_jax.rasterize.contribution import accumulated_weight
 from rein3d_jax.rasterize.rasterize import Frame, allocate, bucket, enlarge, rasterize, render
 
 __all__ = [
@@ -11,7 +11,6 @@ __all__ = [
     "allocate",
     "bucket",
     "enlarge",
-    "median_distance",
     "rasterize",
     "render",
 ]

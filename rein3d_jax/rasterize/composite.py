@@ -7,7 +7,7 @@ Gaussians: the carry then travels to the cache less often. A step gathers its Ga
 is stored for a (Gaussian, tile) pair but its index. Chunks of a tile join by the associative "over". The reverse pass
 walks front to back too, with the weighted sum still to come as its carry, so nothing per evaluation is stored and
 nothing is divided by a small transmittance; its sums over pixels are products with the pixels' monomials. What each
-of these gains is in benchmarks/NOTES.md.
+of these gains is in benchmarks/README.md.
 """
 
 import math
@@ -132,8 +132,8 @@ def _before(through, chunks):
 
 @jax.custom_vjp
 def composite(table: jax.Array, anchors: jax.Array, pixels: jax.Array, chunks: Chunks) -> jax.Array:
-    """`splat_table`, anchors (tiles, k), pixels (1 or tiles, k, p) relative to them -> image (tiles, v + 1, p): the
-    weighted values and, last, alpha. Differentiable in `table` only."""
+    """The image (tiles, v + 1, p), weighted values and, last, alpha, of a `splat_table`, anchors (tiles, k) and pixels
+    (1 or tiles, k, p) relative to them. Differentiable in `table` only."""
     return _composite_forward(table, anchors, pixels, chunks)[0]
 
 
@@ -146,7 +146,7 @@ def _composite_forward(table, anchors, pixels, chunks):
 
 
 def _still_to_come(gradient, layers, image, chunks):
-    """(c, p): what the chunk and those behind it add to the loss, sum_i w_i value_i . g."""
+    """What the chunk and those behind it add (c, p) to the loss, sum_i w_i value_i . g."""
     here = jnp.sum(layers * jnp.take(gradient, chunks.tile, axis=0, mode="clip"), axis=1)
     ahead = _along_tile(jnp.add, here[chunks.order], chunks.rank)[chunks.position] - here
     return jnp.take(jnp.sum(gradient * image, axis=1), chunks.tile, axis=0, mode="clip") - ahead
@@ -212,30 +212,3 @@ composite.defvjp(_composite_forward, _composite_backward)
 def composite_chunks(splats: Splats, values, chunks: Chunks, camera: Camera, tile: int) -> jax.Array:
     """Splats with their values (n, v) and chunks -> (tiles, v + 1, tile^2): premultiplied values and, last, alpha."""
     return composite(splat_table(splats, values), *tile_pixels(camera, tile), chunks)
-
-
-def median_of_chunks(splats: Splats, chunks: Chunks, camera: Camera, tile: int) -> jax.Array:
-    """(tiles, tile^2) metres to the splat at which transmittance falls to one half; 0 where it never does."""
-    table = splat_table(splats, splats.distance[:, None])
-    anchors, pixels = tile_pixels(camera, tile)
-    before = _before(_chunk_layers(table, anchors, pixels, chunks)[:, -1], chunks)
-    blocks = _Blocks(chunks, anchors, pixels)
-
-    def median_block(index, medians):
-        near, planes = blocks.by_tile(anchors, index), blocks.planes(index)
-
-        def step(number, state):
-            through, median = state
-            of_terms, (distance,) = _unpack(blocks.rows(table, index, number), near)
-            for u in range(blocks.unroll):
-                behind = through * (1.0 - _alpha([c[u] for c in of_terms], planes)[1])
-                median = jnp.where((through > 0.5) & (behind <= 0.5), distance[u][:, None], median)
-                through = behind
-            return through, median
-
-        start = blocks.part(before, index)
-        median = jax.lax.fori_loop(0, blocks.steps(index), step, (start, jnp.zeros_like(start)))[1]
-        return jax.lax.dynamic_update_slice_in_dim(medians, median, index * blocks.block, 0)
-
-    medians = jax.lax.fori_loop(0, blocks.count, median_block, jnp.zeros_like(before))
-    return jax.ops.segment_sum(medians, chunks.tile, num_segments=anchors.shape[0] + 1)[:-1]  # one chunk has it

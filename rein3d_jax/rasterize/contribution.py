@@ -1,11 +1,11 @@
-"""What each Gaussian gives to a picture, and where along a ray the picture's middle lies."""
+"""What each Gaussian gives to a picture."""
 
 from functools import partial
 
 import jax
 import jax.numpy as jnp
 
-from rein3d_jax.rasterize.composite import composite_chunks, median_of_chunks
+from rein3d_jax.rasterize.composite import composite_chunks
 from rein3d_jax.rasterize.config import RasterizeConfig
 from rein3d_jax.rasterize.listing import list_splats
 from rein3d_jax.rasterize.pixels import from_tiles
@@ -14,8 +14,8 @@ from rein3d_jax.scene import Camera, Gaussians
 
 @partial(jax.jit, static_argnames=("config",))
 def accumulated_weight(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig) -> jax.Array:
-    """(n,) sum over pixels of w_i = alpha_i T_i, in pixels: what a Gaussian adds to this view; over all Gaussians they
-    sum to the picture's alpha. `config` is `allocate`'s, for a view that does not overflow.
+    """The weights (n,) sum of w_i = alpha_i T_i over pixels: what each Gaussian adds to this view; over all Gaussians
+    they sum to the picture's alpha. `config` is `allocate`'s, for a view that does not overflow.
 
     The picture of a value that is v_i on Gaussian i is sum_i w_i v_i: its gradient by v is the weight.
     """
@@ -27,14 +27,3 @@ def accumulated_weight(gaussians: Gaussians, camera: Camera, *, config: Rasteriz
 
     weight = jax.grad(painted)(jnp.zeros(ids.shape))
     return jnp.zeros(gaussians.alive.shape).at[ids].add(weight, mode="drop")
-
-
-@partial(jax.jit, static_argnames=("config",))
-def median_distance(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig) -> jax.Array:
-    """(h, w) metres along the ray to the Gaussian at which transmittance falls to one half; 0 where it never does.
-
-    Between two surfaces the mean distance lies in empty space, the median on one of them. Not differentiable.
-    """
-    splats, chunks, _, _ = list_splats(gaussians, camera, config=config)
-    tiles = median_of_chunks(splats, chunks, camera, config.tile)
-    return from_tiles(tiles[:, None], camera, config.tile)[..., 0]

@@ -12,7 +12,7 @@ _SUPPORT = 3.33  # sigmas to the 1/255 cut of an opaque splat: sqrt(2 ln 255)
 
 
 def in_view(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig) -> jax.Array:
-    """(n,) bool, conservative: every Gaussian that `project` finds visible is in view.
+    """The mask (n,) bool, conservative: every Gaussian that `project` finds visible is in view.
 
     Pinhole: the ball of 3.33 sigma, and of the filter's reach, touches the frustum's four planes; a panorama
     sees everything alive.

@@ -9,12 +9,12 @@ from rein3d_jax.scene import Camera
 
 
 def grid(camera: Camera, tile: int) -> tuple[int, int]:
-    """(rows, columns) of tiles that cover the image."""
+    """Rows and columns of tiles that cover the image."""
     return -(-camera.height // tile), -(-camera.width // tile)
 
 
 def pixel_features(camera: Camera) -> jax.Array:
-    """(height, width, k): (u, v) of a pinhole camera's pixels, unit rays in camera axes of a panorama's."""
+    """Features (height, width, k): (u, v) of a pinhole camera's pixels, unit rays in camera axes of a panorama's."""
     if camera.model == EQUIRECTANGULAR:
         rays = pixel_rays(camera.height, camera.width)
         return jnp.matmul(rays, world_from_camera_axes(), precision="highest")  # by default a TPU keeps 8 bits
@@ -23,8 +23,8 @@ def pixel_features(camera: Camera) -> jax.Array:
 
 
 def tile_pixels(camera: Camera, tile: int) -> tuple[jax.Array, jax.Array]:
-    """`pixel_features` as an anchor for each tile, (tiles, k), and the pixels' offsets from it, (tiles, k, tile^2); a
-    flat image's tiles all have the same, (1, k, tile^2). Pixels below the image repeat its last row."""
+    """The `pixel_features` as an anchor for each tile, (tiles, k), and the pixels' offsets from it, (tiles, k, tile^2);
+    a flat image's tiles all have the same, (1, k, tile^2). Pixels below the image repeat its last row."""
     rows, columns = grid(camera, tile)
     if camera.model != EQUIRECTANGULAR:
         v, u = jnp.meshgrid(jnp.arange(rows) * tile, jnp.arange(columns) * tile, indexing="ij")
@@ -43,7 +43,7 @@ def tile_pixels(camera: Camera, tile: int) -> tuple[jax.Array, jax.Array]:
 
 
 def from_tiles(tiles: jax.Array, camera: Camera, tile: int) -> jax.Array:
-    """(tiles, k, tile^2) -> (height, width, k)."""
+    """The image (height, width, k) of tiles (tiles, k, tile^2)."""
     rows, columns = grid(camera, tile)
     image = tiles.reshape(rows, columns, -1, tile, tile).transpose(0, 3, 1, 4, 2)
     return image.reshape(rows * tile, columns * tile, -1)[: camera.height, : camera.width]

@@ -24,13 +24,13 @@ from rein3d_jax.scene import Camera, Gaussians
 # Beyond this angular size (radians, one sigma) a footprint is no longer an ellipse on the sphere; up to it,
 # alpha at the antipode, exp(-2 / 0.5^2) = 3e-4, lies under the 1/255 cut. A larger Gaussian is culled, as
 # one at the near plane is.
-MAX_ANGULAR_SIGMA = 0.5
-MAX_RADIAL_SIGMA = 0.3  # of the distance; see _curved
+_MAX_ANGULAR_SIGMA = 0.5
+_MAX_RADIAL_SIGMA = 0.3  # of the distance; see _curved
 
 
 @struct.dataclass
 class Splats:
-    """n splats of one camera; k is 2 (pinhole) or 3 (equirectangular)."""
+    """Splats of one camera, n of them; k is 2 (pinhole) or 3 (equirectangular)."""
 
     mean: jax.Array  # (n, k) in the camera's pixel features
     axes: jax.Array  # (n, k, k) whitening rows
@@ -44,7 +44,7 @@ class Splats:
 
 
 def _whitening(cov_xx, cov_xy, cov_yy, det):
-    """U (n, 2, 2), upper triangular, with U^T U = covariance^-1."""
+    """The whitening U (n, 2, 2), upper triangular, with U^T U = covariance^-1."""
     row_x = jnp.sqrt(cov_yy / det)
     first = jnp.stack([row_x, -row_x * cov_xy / cov_yy], axis=-1)
     second = jnp.stack([jnp.zeros_like(row_x), jax.lax.rsqrt(cov_yy)], axis=-1)
@@ -103,7 +103,7 @@ def _curved(rows, radial):
     At sigma / distance 0.3 the error of moments falls from 13 % to under 5 % (`python -m benchmarks poles`).
     """
     # The series is for Gaussians that keep clear of the camera.
-    radial = radial * (MAX_RADIAL_SIGMA / jnp.maximum(safe_norm(radial, keepdims=True), MAX_RADIAL_SIGMA))
+    radial = radial * (_MAX_RADIAL_SIGMA / jnp.maximum(safe_norm(radial, keepdims=True), _MAX_RADIAL_SIGMA))
     rows = rows + 3.0 * jnp.sum(rows * radial[:, None], axis=-1, keepdims=True) * radial[:, None]
     rows = rows * (1.0 + 1.5 * jnp.sum(radial**2, axis=-1))[:, None, None]
     xx, xy, yy = (jnp.sum(rows[:, i] * rows[:, j], axis=-1) for i, j in ((0, 0), (0, 1), (1, 1)))
@@ -129,7 +129,7 @@ def _equirectangular(points, spread, distance, camera, config):
     axes = jnp.einsum("nij,njk->nik", _whitening(*covariance), frame, precision="highest")
     sigma = jnp.sqrt((xx + yy) / 2 + jnp.sqrt(((xx - yy) / 2) ** 2 + xy**2 + 1e-30))
     axes = jnp.concatenate([axes, (direction / sigma[:, None])[:, None]], axis=1)
-    return direction, axes, factor, sigma[:, None], in_range & (sigma < MAX_ANGULAR_SIGMA)
+    return direction, axes, factor, sigma[:, None], in_range & (sigma < _MAX_ANGULAR_SIGMA)
 
 
 def _sphere_place(direction, reach):
@@ -154,10 +154,10 @@ def _sphere_box(place, camera):
 def project(
     gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig, means2d_offset: jax.Array | None = None
 ) -> Splats:
-    """Gaussians in the world -> splats of `camera`.
+    """The splats of `camera`, of Gaussians in the world.
 
     Culled (visible = False): dead slots, non-finite parameters, centres out of [near, far], opacity under
-    the 1/255 cut, support off the image, and on the sphere sizes over MAX_ANGULAR_SIGMA.
+    the 1/255 cut, support off the image, and on the sphere sizes over _MAX_ANGULAR_SIGMA.
 
     `means2d_offset` (n, 2) pixels, zeros, is added to the projected means: its gradient is the means2d gradient that
     densification reads (3DGS, Sec. 5.2). On the sphere a pixel is a row's pitch on the tangent plane.
@@ -208,7 +208,7 @@ def _feature_offset(pixels, points, distance, camera):
 
 
 def _finite(gaussians: Gaussians) -> jax.Array:
-    """(n,) whether all parameters of a slot are finite."""
+    """Whether all parameters of a slot are finite: (n,)."""
     rows = [gaussians.means, gaussians.log_scales, gaussians.quats, gaussians.opacity_logits[:, None]]
     flat = jnp.concatenate([*rows, gaussians.sh.reshape(gaussians.sh.shape[0], -1)], axis=-1)
     return jnp.all(jnp.isfinite(flat), axis=-1)

@@ -61,12 +61,12 @@ def _rasterize(
 
 
 def _values(splats: Splats, config: RasterizeConfig) -> jax.Array:
-    """(n, 3 or 4): what is composited."""
+    """The values (n, 3 or 4) that are composited."""
     return jnp.concatenate([splats.rgb, splats.distance[:, None]], axis=-1) if config.distance else splats.rgb
 
 
 rasterize = jax.jit(_rasterize, static_argnames=("config",))
-rasterize.__doc__ = """Gaussians, camera -> Frame. Pure; differentiable in every float of both.
+rasterize.__doc__ = """The Frame that a camera sees of Gaussians. Pure; differentiable in every float of both.
 
 `config` must come from `allocate`; `means2d_offset` (n, 2) is `project`'s: zeros that densification differentiates by.
 Check `frame.overflow == 0`, or call `render`, which grows the buffers itself. Raises InputError where buffers are unset
@@ -114,7 +114,7 @@ def enlarge(config: RasterizeConfig, *needed: int) -> RasterizeConfig:
 def render(
     gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig = RasterizeConfig()
 ) -> tuple[Frame, RasterizeConfig]:
-    """`rasterize` that allocates, and allocates again on overflow. Returns the config to reuse."""
+    """The frame, and the config to reuse: `rasterize` that allocates, and allocates again on overflow."""
     if min(config.buffers) == 0:
         config = allocate(gaussians, [camera], config=config)
     while True:

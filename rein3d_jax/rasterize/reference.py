@@ -15,7 +15,7 @@ from rein3d_jax.scene import Camera, Gaussians
 
 
 def rasterize_reference(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig) -> tuple:
-    """(rgb premultiplied (h, w, 3), alpha (h, w), weighted distance (h, w)) in O(n h w) time and memory."""
+    """Premultiplied rgb (h, w, 3), alpha (h, w), weighted distance (h, w), in O(n h w) time and memory."""
     splats = project(gaussians, camera, config=config)
     order = jnp.argsort(jnp.where(splats.visible, splats.distance, jnp.inf))
     splats = jax.tree.map(lambda x: x[order], splats)

@@ -17,7 +17,7 @@ from rein3d_jax.scene import Camera
 
 @struct.dataclass
 class Chunks:
-    """c chunks of l Gaussians, the fullest first: neighbours then take the same number of steps.
+    """Chunks of l Gaussians, c of them, the fullest first: neighbours then take the same number of steps.
 
     `order` lists them by tile, and front first within a tile: chunk order[i] is followed by chunk order[i + 1].
     """
@@ -33,7 +33,7 @@ class Chunks:
 
 def _argsort_packed(major: jax.Array) -> jax.Array:
     """Stable argsort of non-negative int32 through ONE 64-bit sort of (major, index): XLA sorts a single
-    operand 6 times faster on a CPU than a key with a payload (33 against 222 ms for 320k; benchmarks/NOTES.md)."""
+    operand 6 times faster on a CPU than a key with a payload (33 against 222 ms for 320k; benchmarks/README.md)."""
     with jax.enable_x64(True):
         index = jnp.arange(major.shape[0], dtype=jnp.int64)
         packed = jax.lax.sort((major.astype(jnp.int64) << 32) | index, is_stable=False)
@@ -52,7 +52,7 @@ def _expand(counts: jax.Array, capacity: int) -> tuple[jax.Array, jax.Array, jax
 
 
 def needed_pairs(splats: Splats, camera: Camera, *, config: RasterizeConfig) -> jax.Array:
-    """(2,) number of (splat, row of tiles) and (splat, tile) pairs: what `allocate` measures, without a buffer."""
+    """The numbers (2,) of (splat, row of tiles) and (splat, tile) pairs: what `allocate` measures, without a buffer."""
     first, count = tile_rows(splats, camera, config=config)
     ids = jnp.arange(first.shape[0])
 
@@ -64,7 +64,8 @@ def needed_pairs(splats: Splats, camera: Camera, *, config: RasterizeConfig) -> 
 
 
 def _pairs(splats: Splats, camera: Camera, config: RasterizeConfig):
-    """(splat, tile) pairs, nearest splat first: splat (p,), tile (p,) (one past the last where unused), needed (2,)."""
+    """Pairs of splat and tile, nearest splat first: splat (p,), tile (p,) (one past the last where unused), needed
+    (2,)."""
     rows, columns = grid(camera, config.tile)
     first_row, row_count = tile_rows(splats, camera, config=config)
     # Positive floats order as their bits do; unseen splats go last.

@@ -30,7 +30,8 @@ def test_a_constant_is_doubled_and_halved_to_itself() -> None:
 def test_doubling_keeps_the_sum_and_the_range() -> None:
     """Each pixel gives 3/4 + 1/4 along each axis; beyond a pole it gives to itself, turned."""
     doubled = double(IMAGE)
-    np.testing.assert_allclose(doubled.sum(axis=(0, 1)), 4 * IMAGE.sum(axis=(0, 1)), rtol=1e-6)  # float32 sums
+    # float32 sums of n = 512 positive terms: sqrt(n) eps = 3e-6 of the sum in any order.
+    np.testing.assert_allclose(doubled.sum(axis=(0, 1)), 4 * IMAGE.sum(axis=(0, 1)), rtol=1e-5)
     assert doubled.min() >= IMAGE.min() and doubled.max() <= IMAGE.max() + 1e-6
 
 

@@ -137,7 +137,7 @@ def test_any_valid_input_is_finite_with_unit_quaternions(seed: int, scale: float
     valid = jax.random.uniform(jax.random.key(seed + 1), (HEIGHT, WIDTH)) < share
     splats = lift(pano.replace(distance=wild, valid=valid), ORIGIN, EVERY)
     assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(splats))
-    np.testing.assert_allclose(jnp.linalg.norm(splats.quats, axis=-1), 1, atol=1e-7)
+    np.testing.assert_allclose(jnp.linalg.norm(splats.quats, axis=-1), 1, atol=5e-7)  # a few float32 roundings
     assert splats.alive.sum() == valid.sum()
 
 

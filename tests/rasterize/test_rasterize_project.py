@@ -93,7 +93,8 @@ def test_offsets_move_projected_means_by_pixels_and_nothing_else() -> None:
     gaussians = splats_at(np.array([[1.0, 0, 0], [0.8, 0.0, -0.6], [0.8, 0.48, 0.36]]))
     offsets = jnp.array([[3.0, 0.0], [0.0, -2.0], [1.5, 2.0]])
     for camera in (pinhole_camera(upright(jnp.zeros(3)), 64, 2.0), equirectangular_camera(upright(jnp.zeros(3)), 64)):
-        before, after = (run(gaussians, camera, config=RasterizeConfig(), means2d_offset=x) for x in (0 * offsets, offsets))
+        both = (run(gaussians, camera, config=RasterizeConfig(), means2d_offset=x) for x in (0 * offsets, offsets))
+        before, after = both
         moved = np.asarray(after.mean - before.mean)
         if moved.shape[1] == 2:
             np.testing.assert_allclose(moved, offsets, atol=1e-5)  # float32 pixels up to 64

@@ -9,7 +9,7 @@ import pytest
 
 from rein3d_jax.conventions import EQUIRECTANGULAR, PINHOLE
 from rein3d_jax.geometry.poses import upright
-from rein3d_jax.geometry.rotations import matrix_from_quats, multiply_quats, yaw_quat
+from rein3d_jax.geometry.rotations import matrix_from_quats, quats_from_matrix, yaw_quat
 from rein3d_jax.rasterize import rasterize
 
 MODELS = pytest.mark.parametrize("model", [PINHOLE, EQUIRECTANGULAR])
@@ -38,9 +38,10 @@ def test_value_and_gradient_equal_the_oracle(model, antialias, scene_of, camera_
 def test_a_yawed_scene_gives_a_rolled_panorama(columns, scene_of, camera_of, roomy, fast) -> None:
     scene = scene_of()
     scene = scene.replace(sh=scene.sh.at[:, 1:].set(0.0))  # directional colour would have to turn along
-    turn = yaw_quat(columns / 32 * 2 * np.pi)
-    means = jnp.matmul(scene.means, matrix_from_quats(turn).T, precision="highest")
-    turned = scene.replace(means=means, quats=multiply_quats(turn, scene.quats))
+    yaw = matrix_from_quats(yaw_quat(columns / 32 * 2 * np.pi))
+    means = jnp.matmul(scene.means, yaw.T, precision="highest")
+    axes = jnp.matmul(yaw, matrix_from_quats(scene.quats), precision="highest")
+    turned = scene.replace(means=means, quats=quats_from_matrix(axes))
     camera = camera_of(EQUIRECTANGULAR, upright(jnp.zeros(3)))
     image, _ = fast(scene, camera, config=roomy)
     rolled, _ = fast(turned, camera, config=roomy)

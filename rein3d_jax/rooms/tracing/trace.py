@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from rein3d_jax.geometry.colour import srgb_from_linear
-from rein3d_jax.geometry.sphere import pixel_rays, world_from_camera_axes
+from rein3d_jax.geometry.sphere import pixel_rays, world_from_panorama
 from rein3d_jax.rooms.model import Room, TracedPanorama
 from rein3d_jax.rooms.tracing.nearest import SHELL_FACES
 from rein3d_jax.rooms.tracing.outside import outside
@@ -87,8 +87,7 @@ def _steps(room: Room, pose: jax.Array, height: int) -> tuple[Vector, Vector]:
 
 def _in_room(room: Room, pose: jax.Array, camera: Vector) -> Vector:
     """Vectors (h, w) in the room's axes, of vectors in a panorama's own, whose +X is its centre column."""
-    rotation = jnp.matmul(pose[:3, :3], world_from_camera_axes().T, precision="highest")
-    rotation = jnp.matmul(_room_from_world(room), rotation, precision="highest")
+    rotation = jnp.matmul(_room_from_world(room), world_from_panorama(pose), precision="highest")
     rows = [[rotation[i, j] for j in range(3)] for i in range(3)]
     return tuple(x * camera[0] + y * camera[1] + z * camera[2] for x, y, z in rows)
 
