@@ -23,7 +23,7 @@ class FilmConfig(Settings):
     height: int = setting(270, "of a frame", within="[16, 8192]", unit="pixels")
     fov: float = setting(1.5, "across the width", within="(0, 3]", unit="radians")
     step: float = setting(0.2, "between frames on a path", within="(0, inf)", unit="metres")
-    yaw_step: float = setting(0.1, "between frames on the way round to the next path", within="(0, inf)", unit="radians")
+    yaw_step: float = setting(0.1, "between frames on the way to the next path", within="(0, inf)", unit="radians")
     rate: int = setting(15, "of the film", within="[1, 240]", unit="frames a second")
 
 

@@ -130,7 +130,7 @@ def _standing(metrics: dict) -> Scatter:
     own = "this run" if merit is not None else "this run's seconds (no truth to compare with)"
     rooms = len(measured["rooms"])
     caption = (
-        f"The other marks are means over {rooms} traced rooms on two cores of a 2.5 GHz Xeon; this run is one scene on "
+        f"The other marks are means over {rooms} traced rooms on two cores of an AMD EPYC; this run is one scene on "
         "your computer, so compare the order of magnitude. Up and to the left is better."
     )
     return Scatter("Where this run stands", caption, panel["cost_label"], panel["merit_label"],
