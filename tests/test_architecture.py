@@ -1,4 +1,4 @@
-"""The house's rules of design.md, held by reading every file: who may import whom, each outside dependency's home,
+"""The house's rules, held by reading every file: who may import whom, each outside dependency's home,
 names, sizes, docstrings."""
 
 import ast
