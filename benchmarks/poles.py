@@ -19,7 +19,7 @@ from rein3d_jax.geometry.poses import equirectangular_camera, upright
 from rein3d_jax.geometry.rotations import quats_from_matrix
 from rein3d_jax.geometry.sphere import pixel_rays, pixel_solid_angles
 from rein3d_jax.io.files.atomic import write_bytes, write_text
-from rein3d_jax.rasterize import RasterizeConfig, allocate, rasterize
+from rein3d_jax.rasterize import RasterizeConfig, render
 from rein3d_jax.scene import Gaussians
 
 LATITUDES = (0.0, 45.0, 75.0, 85.0, 88.0, 89.0, 89.5, 89.9)  # degrees
@@ -96,8 +96,8 @@ def _ours(frame, axes, height):
         jnp.ones(1, bool),
     )
     camera = equirectangular_camera(upright(jnp.zeros(3)), height)
-    config = allocate(scene, [camera], config=RasterizeConfig(antialias=False, distance=False))
-    return np.asarray(rasterize(scene, camera, config=config).alpha, np.float64)
+    frame, _ = render(scene, camera, config=RasterizeConfig(antialias=False, distance=False))
+    return np.asarray(frame.alpha, np.float64)
 
 
 def _plain_ewa(latitude, axes, height):

@@ -26,13 +26,14 @@ ROUNDS = 7
 
 def _seconds(scene, camera) -> tuple[float, int]:
     """Median wall seconds of a picture, and its (Gaussian, pixel) evaluations."""
-    config = allocate(scene, [camera], config=CONFIG)
-    pairs, times = int(jax.block_until_ready(rasterize(scene, camera, config=config)).needed[2]), []
+    buffers = allocate(scene, [camera], config=CONFIG)
+    frame = jax.block_until_ready(rasterize(scene, camera, config=CONFIG, buffers=buffers))
+    pairs, times = int(frame.needed[2]), []
     for _ in range(ROUNDS):
         started = time.perf_counter()
-        jax.block_until_ready(rasterize(scene, camera, config=config))
+        jax.block_until_ready(rasterize(scene, camera, config=CONFIG, buffers=buffers))
         times.append(time.perf_counter() - started)
-    return statistics.median(times), pairs * config.tile**2
+    return statistics.median(times), pairs * CONFIG.tile**2
 
 
 def _slope(sizes, seconds) -> float:

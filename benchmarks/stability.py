@@ -36,7 +36,7 @@ from rein3d_jax.geometry.shell import meet_shell, world_from_shell
 from rein3d_jax.geometry.sphere import pixel_rays, rays_of_pose
 from rein3d_jax.geometry.spherical_harmonics import C0
 from rein3d_jax.io.files.atomic import write_text
-from rein3d_jax.rasterize import RasterizeConfig, rasterize, render
+from rein3d_jax.rasterize import Buffers, RasterizeConfig, rasterize, render
 from rein3d_jax.refine import Curves, DensifyConfig, RefineConfig, Views, ViewsConfig, first_snapshot, refine
 from rein3d_jax.refine.views import camera_of
 from rein3d_jax.scene import Gaussians
@@ -44,7 +44,8 @@ from rein3d_jax.scene import Gaussians
 # Evaluated, never fitted to.
 NOVEL = [0.5 * np.array([np.cos(a), np.sin(a), 0.4 * np.cos(2 * a)]) for a in 0.5 + np.arange(3) * 2.1]
 EXTENT = 2.0  # metres, about the median distance
-RASTER = RasterizeConfig(visible_capacity=4096, row_capacity=16384, pair_capacity=32768, chunk_capacity=2048)
+RASTER = RasterizeConfig()
+BUFFERS = Buffers(visible=4096, rows=16384, pairs=32768, chunks=2048)
 CONFIG = RefineConfig(
     steps=240, batch=2, evaluate_every=1000, sh_degree=1, sh_degree_every=100,
     views=ViewsConfig(size=32, held_out_every=8),
@@ -55,9 +56,10 @@ KEY = jax.random.key(0)
 
 def seen_from(scene: Gaussians, places) -> list[tuple[np.ndarray, np.ndarray]]:
     """(rgb over black, distance) of panoramas of the scene."""
-    frames, raster = [], RASTER
+    frames, buffers = [], BUFFERS
     for place in places:
-        frame, raster = render(scene, equirectangular_camera(pose_at(place), HEIGHT), config=raster)
+        camera = equirectangular_camera(pose_at(place), HEIGHT)
+        frame, buffers = render(scene, camera, config=RASTER, buffers=buffers)
         frames.append((np.clip(frame.rgb, 0, 1), np.asarray(frame.distance)))
     return frames
 
@@ -90,6 +92,7 @@ def decibels(scene: Gaussians, paint: Paint, region=everywhere) -> float:
 def fit(scene: Gaussians, views: Views, config: RefineConfig, extent: float = EXTENT) -> tuple[Gaussians, Curves]:
     """`refine`, from the same key and in the same buffers always."""
     start = first_snapshot(scene, views, extent=extent, config=config, raster=RASTER)
+    start = start.replace(buffers=jnp.array(BUFFERS.enlarged(start.buffers)))
     (last,) = deque(refine(start, views, KEY, config=config, raster=RASTER), maxlen=1)
     assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(last.scene)), "not finite"
     return last.scene, last.curves
@@ -115,7 +118,8 @@ def pictures_in(unit: float) -> dict[str, np.ndarray]:
     found = {}
     for place, some in (("origin", range(6)), ("elsewhere", range(6, len(views.rgb), 3))):
         for name, g in (("lifted", scene), ("refined", fitted)):
-            frames = [rasterize(g, camera_of(views, index), config=RASTER).rgb for index in some]
+            cameras = [camera_of(views, index) for index in some]
+            frames = [rasterize(g, camera, config=RASTER, buffers=BUFFERS).rgb for camera in cameras]
             found[f"{name}_{place}"] = np.stack(frames)
     return found
 

@@ -19,7 +19,7 @@ BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#]+)[^)]*\)")
 NAMED = re.compile(r"`([\w.]+(?:/[\w.]+)*/?)`")  # words in backquotes that may be paths
 SUFFIXES = (".py", ".md", ".toml", ".json", ".png", ".jpg", ".ipynb", ".txt", ".cff", "/")
-WRITTEN = ("runs/", "stages/", "export/")  # by a run
+WRITTEN = ("runs/", "stages/", "export/", "room_000123/")  # by a run
 COMMAND = re.compile(r"(?:\brein3d |python -m experiments\.)([a-z]\w*)")
 MEASUREMENT = re.compile(r"python -m benchmarks[ .]([a-z][\w.]*\w)")
 
@@ -50,6 +50,7 @@ def outside(text: str) -> list[str]:
     return [line for line in text.splitlines() if re.search(r"\.\./shared|shared/|\bissue \d|design\.md", line)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("paper", READMES, ids=lambda path: path.parent.name)
 def test_python_in_the_readme_runs(paper, tmp_path, monkeypatch):
     """In one namespace, in order; files are written to a temporary folder that also shows the repository's own."""

@@ -43,38 +43,39 @@ def camera_of(workload: Workload) -> Camera:
 def build(workload: Workload) -> Engine:
     """Buffers are measured outside jit, as a user's driver does."""
     scene, camera, target = scene_of(workload), camera_of(workload), jnp.asarray(workload.target)
-    config = allocate(scene, [camera], config=CONFIG)
+    buffers = allocate(scene, [camera], config=CONFIG)
+    picture = partial(rasterize, config=CONFIG, buffers=buffers)
 
     def loss(floats):
-        return jnp.mean((rasterize(scene.replace(**floats), camera, config=config).rgb - target) ** 2)
+        return jnp.mean((picture(scene.replace(**floats), camera).rgb - target) ** 2)
 
     names = ("means", "log_scales", "quats", "opacity_logits", "sh")
     floats = {name: getattr(scene, name) for name in names}
     gradient = jax.jit(jax.value_and_grad(loss))
-    needed = rasterize(scene, camera, config=config).needed
+    needed = picture(scene, camera).needed
     memory = gradient.lower(floats).compile().memory_analysis()
     sizes = memory.temp_size_in_bytes + memory.argument_size_in_bytes + memory.output_size_in_bytes
     return Engine(
-        forward=lambda: rasterize(scene, camera, config=config),
+        forward=lambda: picture(scene, camera),
         gradient=lambda: gradient(floats),
         wait=jax.block_until_ready,
-        step=_stepper(scene, camera, target, config),
+        step=_stepper(scene, camera, target, picture),
         facts={
             "visible": int(needed[0]),
             "pairs": int(needed[2]),
-            "evaluations": int(needed[2]) * config.tile**2,
+            "evaluations": int(needed[2]) * CONFIG.tile**2,
             "buffer_bytes_per_gaussian": sizes / workload.size.count,
         },
-        parts=_parts(scene, camera, config),
+        parts=_parts(scene, camera, buffers),
     )
 
 
-def _stepper(scene, camera, target, config):
+def _stepper(scene, camera, target, picture):
     """The refinement's own optimizer on the workload's loss."""
     optimizer = make_optimizer(RefineConfig(sh_degree=0))
 
     def loss(parameters):
-        frame = rasterize(join_parameters(parameters, scene.alive), camera, config=config)
+        frame = picture(join_parameters(parameters, scene.alive), camera)
         return jnp.mean((frame.rgb - target) ** 2)
 
     @partial(jax.jit, donate_argnums=0)
@@ -93,14 +94,13 @@ def _stepper(scene, camera, target, config):
     return step
 
 
-def _parts(scene, camera, config):
+def _parts(scene, camera, buffers):
     """The stages of a picture, each compiled alone: name -> call."""
-    cull = jax.jit(
-        lambda scene: gather_in_view(scene, in_view(scene, camera, config=config), config.visible_capacity)[0]
-    )
-    place = jax.jit(lambda seen: project(seen, camera, config=config))
-    bin_ = jax.jit(lambda splats: bin_splats(splats, camera, config=config))
-    paint = jax.jit(lambda s, c: from_tiles(composite_chunks(s, s.rgb, c, camera, config.tile), camera, config.tile))
+    tile = CONFIG.tile
+    cull = jax.jit(lambda scene: gather_in_view(scene, in_view(scene, camera, config=CONFIG), buffers.visible)[0])
+    place = jax.jit(lambda seen: project(seen, camera, config=CONFIG))
+    bin_ = jax.jit(lambda splats: bin_splats(splats, camera, config=CONFIG, buffers=buffers))
+    paint = jax.jit(lambda s, c: from_tiles(composite_chunks(s, s.rgb, c, camera, tile), camera, tile))
     seen = cull(scene)
     splats = place(seen)
     chunks = bin_(splats)

@@ -22,7 +22,7 @@ from rein3d_jax.evaluate.regions import OBSERVED
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.lift import LiftConfig
 from rein3d_jax.pipeline.survey import lift_scene
-from rein3d_jax.rasterize import RasterizeConfig, allocate, enlarge, render
+from rein3d_jax.rasterize import Buffers, RasterizeConfig, allocate, render
 from rein3d_jax.scene import Gaussians
 
 RECIPE = "quick"
@@ -47,11 +47,12 @@ def decibels(squared: np.ndarray) -> float:
     return float(-10 * np.log10(max(squared.mean(), 1e-10)))
 
 
-def measure(scene: Gaussians, case: Case, raster: RasterizeConfig) -> tuple[dict, RasterizeConfig]:
-    """A room's row: PSNR meaned over novel views, over all their observed pixels together, and over the origin's."""
+def measure(scene: Gaussians, case: Case, raster: RasterizeConfig, buffers: Buffers) -> tuple[dict, Buffers]:
+    """A room's row, and the buffers to reuse. PSNR: the novel views' mean, that of all their observed
+    pixels together, and the origin's mean."""
     novel, observed, origin, alphas = [], [], [], []
     for view in case.views:
-        frame, raster = render(scene, view.camera, config=raster)
+        frame, buffers = render(scene, view.camera, config=raster, buffers=buffers)
         alpha = np.asarray(frame.alpha)[..., None]
         picture = np.clip(np.clip(frame.rgb, 0, alpha) + (1 - alpha) * np.asarray(case.room.backdrop), 0, 1)
         squared = np.mean((picture - np.asarray(view.rgb)) ** 2, axis=-1)
@@ -63,16 +64,17 @@ def measure(scene: Gaussians, case: Case, raster: RasterizeConfig) -> tuple[dict
         alphas.append(alpha.mean())
     row = {"count": int(jnp.sum(scene.alive)), "psnr": float(np.mean(novel)), "psnr_origin": float(np.mean(origin))}
     seen = {"psnr_observed": decibels(np.concatenate(observed)), "coverage": float(np.mean(alphas))}
-    return row | seen, raster
+    return row | seen, buffers
 
 
 def rows_of(config: LiftConfig, cases: list[Case], raster: RasterizeConfig) -> list[dict]:
     """A variant's row of each room. Buffers are kept from room to room: the rasterizer compiles once or twice."""
-    rows = []
+    rows, buffers = [], None
     for case in cases:
         scene = lift_scene(case.room.panorama, config)
         needed = allocate(scene, [view.camera for view in case.views], config=raster, slack=1.0)
-        row, raster = measure(scene, case, enlarge(raster, *needed.buffers))
+        buffers = needed if buffers is None else buffers.enlarged(needed)
+        row, buffers = measure(scene, case, raster, buffers)
         rows.append(row)
     return rows
 

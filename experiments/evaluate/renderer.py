@@ -38,11 +38,11 @@ def scene_renderer(gaussians: Gaussians, cameras: Sequence[Camera], raster: Rast
     kinds = {}
     for camera in cameras:
         kinds.setdefault(_kind(camera), []).append(camera)
-    configs = {kind: allocate(gaussians, alike, config=raster) for kind, alike in kinds.items()}
+    buffers = {kind: allocate(gaussians, alike, config=raster) for kind, alike in kinds.items()}
 
     def renderer(camera: Camera) -> Rendering:
         kind = _kind(camera)
-        frame, configs[kind] = render(gaussians, camera, config=configs.get(kind, raster))
+        frame, buffers[kind] = render(gaussians, camera, config=raster, buffers=buffers.get(kind))
         return Rendering(jnp.clip(safe_divide(frame.rgb, frame.alpha[..., None]), 0, 1), frame.alpha, frame.distance)
 
     return renderer

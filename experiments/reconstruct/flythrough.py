@@ -38,11 +38,11 @@ def flythrough(
     """Yields (height, width, 3) pictures. The way back shows the way out again, backwards: it is rendered once."""
     azimuths, lengths = np.asarray(trajectories.directions), np.asarray(trajectories.lengths)
     ends = [_camera(np.zeros(3), -azimuth, film) for azimuth in azimuths]
-    config = allocate(gaussians, ends, config=config, slack=1.5)
+    buffers = allocate(gaussians, ends, config=config, slack=1.5)
 
     def picture(camera):
-        nonlocal config
-        frame, config = render(gaussians, camera, config=config)
+        nonlocal buffers
+        frame, buffers = render(gaussians, camera, config=config, buffers=buffers)
         return np.asarray(jnp.clip(frame.rgb + (1 - frame.alpha[..., None]) * backdrop, 0, 1))
 
     for index, (azimuth, length) in enumerate(zip(azimuths, lengths, strict=True)):

@@ -66,5 +66,5 @@ def _ends(trajectories: Trajectories) -> jax.Array:
 
 def _panoramas(scene: Gaussians, poses: jax.Array, config) -> tuple[list, float]:
     """What the scene shows there, holes black; and the share of the sphere that it covers, the poses' mean."""
-    video, _ = render_video(scene, poses, config.restore.height, config.rasterize)
+    video, _ = render_video(scene, poses, config.restore.height, config=config.rasterize)
     return list(np.asarray(video.rgb * video.alpha[..., None])), float(jnp.mean(coverage(video.alpha)))

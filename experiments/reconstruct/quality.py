@@ -20,9 +20,9 @@ def is_novel(view: View) -> bool:
 def render_views(gaussians: Gaussians, views: list[View], backdrop: jax.Array, *, config: RasterizeConfig):
     """[(h, w, 3)] pictures of the scene over the colour `backdrop` (3,)."""
     pictures = []
-    config = allocate(gaussians, [view.camera for view in views], config=config) if views else config
+    buffers = allocate(gaussians, [view.camera for view in views], config=config) if views else None
     for view in views:
-        frame, config = render(gaussians, view.camera, config=config)
+        frame, buffers = render(gaussians, view.camera, config=config, buffers=buffers)
         pictures.append(np.asarray(jnp.clip(frame.rgb + (1 - frame.alpha[..., None]) * backdrop, 0, 1)))
     return pictures
 

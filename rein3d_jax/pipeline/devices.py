@@ -9,7 +9,7 @@ from jax.sharding import Mesh
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.parallel import data_parallel
-from rein3d_jax.refine.step import step
+from rein3d_jax.refine.step import batch_sums, update
 
 
 def steps_over(mesh: Mesh) -> Callable:
@@ -17,19 +17,20 @@ def steps_over(mesh: Mesh) -> Callable:
     and only sums travel. It raises InputError where the devices do not divide the batch."""
 
     @cache
-    def compiled(config, raster):
+    def compiled(config, raster, buffers):
         def shared(carried, views, total):
             state, chance = carried
-            state, metrics = step(state, views, chance, config=config, raster=raster, total=total)
+            sums, needed = batch_sums(state, views, chance.backdrop, config=config, raster=raster, buffers=buffers)
+            state, metrics = update(state, total(sums), needed, chance, config=config, buffers=buffers)
             return (state, chance), metrics
 
         return data_parallel(shared, mesh, backend="pmap")
 
-    def take_step(state, views, batch, chance, *, config, raster):
+    def take_step(state, views, chance, *, config, raster, buffers):
         if config.batch % mesh.size:
             raise InputError(f"refine.batch {config.batch} is not divided by {mesh.size} devices; make it a multiple")
-        chosen = jax.tree.map(lambda x: np.asarray(x)[np.asarray(batch)], views)
-        (state, _), metrics = compiled(config, raster)((state, chance), chosen)
+        chosen = jax.tree.map(lambda x: np.asarray(x)[np.asarray(chance.batch)], views)
+        (state, _), metrics = compiled(config, raster, buffers)((state, chance), chosen)
         return state, metrics
 
     return take_step

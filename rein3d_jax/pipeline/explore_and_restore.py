@@ -12,7 +12,7 @@ from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.pipeline.fuse import Fused, fuse_guesses
 from rein3d_jax.pipeline.stages import Stages, render_video
 from rein3d_jax.pipeline.survey import Survey
-from rein3d_jax.rasterize import RasterizeConfig, allocate, enlarge
+from rein3d_jax.rasterize import Buffers, allocate
 from rein3d_jax.restore import Restorer
 from rein3d_jax.scene import Gaussians, Video
 
@@ -45,26 +45,26 @@ def _explored(known: Survey, restore: Restorer, key: jax.Array, stages: Stages, 
     if last is None:
         index, before = 0, Fused(known.coarse, 0, _first_buffers(known, stages))
     else:
-        index, raster = int(last.taken), enlarge(stages.rasterize, *(int(x) for x in last.buffers))
-        before = Fused(last.scene, int(last.overflow), raster)
-    paths, height = known.trajectories, stages.restore.height
+        index = int(last.taken)
+        before = Fused(last.scene, int(last.overflow), Buffers(*map(int, last.buffers)))
+    paths, height, raster = known.trajectories, stages.restore.height, stages.rasterize
     poses = paths.world_from_camera[index, : int(paths.counts[index])]
     seen = before.scene if stages.restore.sequential else known.coarse
-    end, raster = render_video(seen, poses[-1:], height, before.raster)
+    end, buffers = render_video(seen, poses[-1:], height, config=raster, buffers=before.buffers)
     revealed = 1 - jnp.mean(coverage(end.alpha))
     if revealed < stages.explore.min_revealed:
-        video, raster = render_video(seen, poses[:1], height, raster)
-        after = before.replace(raster=raster)
+        video, buffers = render_video(seen, poses[:1], height, config=raster, buffers=buffers)
+        after = before.replace(buffers=buffers)
     else:
-        degraded, raster = render_video(seen, poses, height, raster)
-        video, after = restore(degraded, key), before.replace(raster=raster)
+        degraded, buffers = render_video(seen, poses, height, config=raster, buffers=buffers)
+        video, after = restore(degraded, key), before.replace(buffers=buffers)
         if stages.restore.method != "none":
             after = fuse_guesses(after, degraded, video, known.panorama, stages)
-    counts = (jnp.asarray(index + 1), revealed, jnp.asarray(after.overflow), jnp.array(after.raster.buffers))
+    counts = (jnp.asarray(index + 1), revealed, jnp.asarray(after.overflow), jnp.array(after.buffers))
     return Explored(after.scene, video, *counts)
 
 
-def _first_buffers(known: Survey, stages: Stages) -> RasterizeConfig:
+def _first_buffers(known: Survey, stages: Stages) -> Buffers:
     paths = known.trajectories
     ends = [poses[int(n) - 1] for poses, n in zip(paths.world_from_camera, paths.counts, strict=True)]
     cameras = [equirectangular_camera(pose, stages.restore.height) for pose in ends]

@@ -10,7 +10,7 @@ from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.geometry.sphere import rays_of_pose
 from rein3d_jax.lift import lift, merge
 from rein3d_jax.pipeline.stages import Stages
-from rein3d_jax.rasterize import RasterizeConfig, render
+from rein3d_jax.rasterize import Buffers, render
 from rein3d_jax.scene import Gaussians, Panorama, Video
 
 _MOVED = 1e-3  # relative: more than rounding, less than the least move of hidden_distance
@@ -22,13 +22,13 @@ class Fused:
 
     scene: Gaussians
     overflow: int  # Gaussians that found no slot
-    raster: RasterizeConfig = struct.field(pytree_node=False)  # with the buffers as they have grown
+    buffers: Buffers = struct.field(pytree_node=False)  # the rasterizer's, as they have grown
 
 
 def fuse_guesses(start: Fused, degraded: Video, restored: Video, panorama: Panorama, stages: Stages) -> Fused:
     """Lift a restored video into what the scene leaves open, farthest frame first: it opens the largest holes, and the
     nearer ones then see them closed. `degraded` is the video before restoring, `panorama` the input."""
-    scene, overflow, raster, last = start.scene, start.overflow, start.raster, restored.rgb.shape[0] - 1
+    scene, overflow, buffers, last = start.scene, start.overflow, start.buffers, restored.rgb.shape[0] - 1
     # Edges were snapped when the input was lifted; a guess has none to mend.
     config = dataclasses.replace(stages.lift, snap_edges=False)
     # One that had to move lies on no surface that anybody saw: stretched along its neighbours it made fog.
@@ -37,7 +37,7 @@ def fuse_guesses(start: Fused, degraded: Video, restored: Video, panorama: Panor
         camera = equirectangular_camera(restored.world_from_camera[index], restored.rgb.shape[1])
         alpha = degraded.alpha[index]
         if index < last or not stages.restore.sequential:  # the scene has grown since the video was rendered
-            frame, raster = render(scene, camera, config=raster)
+            frame, buffers = render(scene, camera, config=stages.rasterize, buffers=buffers)
             alpha = frame.alpha
         guess = _guess(restored, index, panorama)
         hole = (alpha < stages.restore.observed) & guess.valid
@@ -45,7 +45,7 @@ def fuse_guesses(start: Fused, degraded: Video, restored: Video, panorama: Panor
         for part, config_of_part in ((hole & ~moved, config), (hole & moved, round_ones)):
             scene, dropped = merge(scene, lift(guess, camera.world_from_camera, part, config=config_of_part))
             overflow += int(dropped)
-    return Fused(scene, overflow, raster)
+    return Fused(scene, overflow, buffers)
 
 
 def _guess(video: Video, index: int, panorama: Panorama) -> Panorama:
@@ -53,4 +53,3 @@ def _guess(video: Video, index: int, panorama: Panorama) -> Panorama:
     rgb, distance, pose = (x[index] for x in (video.rgb, video.distance, video.world_from_camera))
     place = hidden_distance(panorama, pose[:3, 3], rays_of_pose(pose, *distance.shape), distance)
     return Panorama(rgb, place, place > 0)
-

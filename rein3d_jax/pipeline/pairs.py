@@ -17,7 +17,7 @@ from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.geometry.safe import safe_divide
 from rein3d_jax.lift import LiftConfig, lift
 from rein3d_jax.pipeline.stages import level_pose
-from rein3d_jax.rasterize import RasterizeConfig, enlarge, rasterize
+from rein3d_jax.rasterize import Buffers, RasterizeConfig, bucket, rasterize
 from rein3d_jax.rooms.config import RoomConfig
 from rein3d_jax.rooms.generate import generate_room
 from rein3d_jax.rooms.tracing.trace import trace
@@ -75,11 +75,11 @@ class Drawn:
     needed: jax.Array  # (4,) the rasterizer's buffers that the degraded clip called for
 
 
-def room_pair(key: jax.Array, config: PairConfig) -> Drawn:
+def room_pair(key: jax.Array, config: PairConfig, buffers: Buffers) -> Drawn:
     """The pair of a key: a room with a path of the config's length, drawn again until there is one.
 
-    Pure; for jit (config static) and vmap over keys. The caller checks `length >= config.length`, and that `needed`
-    fits config.rasterize.buffers (`with_buffers` sets them); else frames miss splats.
+    Pure; for jit (config and buffers static) and vmap over keys. The caller checks `length >= config.length`, and that
+    the buffers (`pair_buffers`) hold what is `needed`; else frames miss splats.
     """
     draw_key, path_key = jax.random.split(key)
 
@@ -102,23 +102,23 @@ def room_pair(key: jax.Array, config: PairConfig) -> Drawn:
     if (config.source_rows, config.samples) != (config.height, 1):
         apart = trace(place, level_pose(start), config.source_rows)
         source = apart.rgb, apart.distance
-    degraded, needed = _degraded(Panorama(*source, source[1] > 0), level_pose(offsets), config)
+    degraded, needed = _degraded(Panorama(*source, source[1] > 0), level_pose(offsets), config, buffers)
     return Drawn(Pair(_clean(clean.rgb, clean.distance, offsets), degraded), path.length, draws, needed)
 
 
 def make_pair(key: jax.Array, config: PairConfig) -> Drawn:
     """`room_pair` with buffers that fit. Raises InputError where no room of ATTEMPTS has the path."""
-    config = with_buffers(config)
+    buffers = pair_buffers(config)
     while True:
-        drawn = _room_pair(key, config)
+        drawn = _room_pair(key, config, buffers)
         if float(drawn.length) < config.length:
             raise InputError(
                 f"none of {ATTEMPTS} rooms has a straight path of {config.length:g} m (frames, speed, rate) that keeps "
                 f"{config.explore.clearance:g} m clearance (explore); the longest of the last is {drawn.length:.2f} m"
             )
-        if (more := grown(config, drawn.needed)) is None:
+        if buffers.hold(drawn.needed):
             return drawn
-        config = more
+        buffers = buffers.enlarged(drawn.needed)
 
 
 def scene_pair(key: jax.Array, render: PanoramaTracer, config: PairConfig) -> Drawn:
@@ -157,15 +157,16 @@ def clip_places(key: jax.Array, path: Chord, config: PairConfig) -> tuple[jax.Ar
     return steps[:, None] * path.direction, path.start + begin * path.direction
 
 
-def _degraded(panorama: Panorama, poses: jax.Array, config: PairConfig) -> tuple[Video, jax.Array]:
-    """The video, and the buffers (4,) that it called for: it is whole where the config's are as large."""
+def _degraded(panorama: Panorama, poses: jax.Array, config: PairConfig, buffers: Buffers) -> tuple[Video, jax.Array]:
+    """The video, and the buffers (4,) that it called for: it is whole where `buffers` are as large."""
     distance = complete_distance(panorama.distance, panorama.valid, config=config.depth)
     everywhere = jnp.ones(panorama.valid.shape, bool)
     placed = Panorama(panorama.rgb, distance, everywhere)  # what has no distance has a colour
     scene = lift(placed, level_pose(jnp.zeros(3)), everywhere, config=config.lift)
 
     def frame_at(pose):
-        frame = rasterize(scene, equirectangular_camera(pose, config.height), config=config.rasterize)
+        camera = equirectangular_camera(pose, config.height)
+        frame = rasterize(scene, camera, config=config.rasterize, buffers=buffers)
         rgb = safe_divide(frame.rgb, frame.alpha[..., None])
         return jnp.clip(rgb, 0, 1), frame.alpha, frame.distance, frame.needed
 
@@ -174,12 +175,12 @@ def _degraded(panorama: Panorama, poses: jax.Array, config: PairConfig) -> tuple
 
 
 def _fitting(panorama: Panorama, poses: jax.Array, config: PairConfig) -> tuple[Video, jax.Array]:
-    config = with_buffers(config)
+    buffers = pair_buffers(config)
     while True:
-        video, needed = _degraded_compiled(panorama, poses, config)
-        if (more := grown(config, needed)) is None:
+        video, needed = _degraded_compiled(panorama, poses, config, buffers)
+        if buffers.hold(needed):
             return video, needed
-        config = more
+        buffers = buffers.enlarged(needed)
 
 
 def _seen(render: PanoramaTracer, position: jax.Array, rows: int) -> tuple[jax.Array, jax.Array, jax.Array]:
@@ -192,23 +193,15 @@ def _clean(rgb: jax.Array, distance: jax.Array, offsets: jax.Array) -> Video:
     return Video(rgb, jnp.ones(distance.shape), distance, level_pose(offsets))
 
 
-def with_buffers(config: PairConfig) -> PairConfig:
-    """The config with rasterizer buffers that most clips fit: a function of the config alone, since sums over buffers
-    of other sizes round otherwise, and a clip's bytes may not depend on those before it."""
+def pair_buffers(config: PairConfig) -> Buffers:
+    """The rasterizer's buffers that most clips fit: a function of the config alone, since sums over buffers of other
+    sizes round otherwise, and a clip's bytes may not depend on those before it."""
     splats = 2 * config.source_rows**2
     tiles = 2 * (config.height // config.rasterize.tile) ** 2
     pairs = 3 * splats + 90 * tiles  # measured at 128 and 256 source rows: 2.7 splats + 82 tiles
     sizes = (splats, 3 * splats // 2 + 20 * tiles, pairs, pairs // config.rasterize.chunk + tiles)
-    return dataclasses.replace(config, rasterize=enlarge(config.rasterize, *sizes))
+    return Buffers(*map(bucket, sizes))
 
 
-def grown(config: PairConfig, needed: jax.Array) -> PairConfig | None:
-    """The config with buffers for `needed` (4,); None where it has them already."""
-    sizes = [int(x) for x in needed]
-    if all(size <= has for size, has in zip(sizes, config.rasterize.buffers, strict=True)):
-        return None
-    return dataclasses.replace(config, rasterize=enlarge(config.rasterize, *sizes))
-
-
-_room_pair = jax.jit(room_pair, static_argnames="config")
-_degraded_compiled = jax.jit(_degraded, static_argnames="config")
+_room_pair = jax.jit(room_pair, static_argnames=("config", "buffers"))
+_degraded_compiled = jax.jit(_degraded, static_argnames=("config", "buffers"))

@@ -11,7 +11,7 @@ from rein3d_jax.explore.profile import ExploreConfig
 from rein3d_jax.geometry.poses import equirectangular_camera, rigid
 from rein3d_jax.geometry.sphere import world_from_camera_axes
 from rein3d_jax.lift import LiftConfig
-from rein3d_jax.rasterize import RasterizeConfig, render
+from rein3d_jax.rasterize import Buffers, RasterizeConfig, render
 from rein3d_jax.refine import RefineConfig
 from rein3d_jax.restore import RestoreConfig
 from rein3d_jax.scene import Gaussians, Video
@@ -41,11 +41,14 @@ def origin_pose() -> jax.Array:
     return level_pose(jnp.zeros(3))
 
 
-def render_video(gaussians: Gaussians, poses: jax.Array, height: int, raster: RasterizeConfig):
-    """Panoramas along `poses` (t, 4, 4) -> (Video with colour un-premultiplied, the config with grown buffers)."""
+def render_video(
+    gaussians: Gaussians, poses: jax.Array, height: int, *, config: RasterizeConfig, buffers: Buffers | None = None
+) -> tuple[Video, Buffers]:
+    """The panoramas along `poses` (t, 4, 4), colour un-premultiplied, and the buffers to reuse."""
     frames = []
     for pose in poses:
-        frame, raster = render(gaussians, equirectangular_camera(pose, height), config=raster)
+        camera = equirectangular_camera(pose, height)
+        frame, buffers = render(gaussians, camera, config=config, buffers=buffers)
         frames.append((frame.rgb / jnp.maximum(frame.alpha, 1e-6)[..., None], frame.alpha, frame.distance))
     rgb, alpha, distance = (jnp.stack(part) for part in zip(*frames, strict=True))
-    return Video(jnp.clip(rgb, 0, 1), alpha, distance, poses), raster
+    return Video(jnp.clip(rgb, 0, 1), alpha, distance, poses), buffers

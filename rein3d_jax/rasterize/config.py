@@ -1,4 +1,4 @@
-"""What fixes the rasterizer's shapes and its picture. Static under jit."""
+"""What fixes the rasterizer's picture. Static under jit."""
 
 import dataclasses
 
@@ -9,7 +9,7 @@ from rein3d_jax.settings import Settings, setting
 
 @dataclasses.dataclass(frozen=True)
 class RasterizeConfig(Settings):
-    """The rasterizer's picture and buffers. A buffer size of 0 means "measure it", which `allocate` and `render` do."""
+    """How Gaussians become a picture."""
 
     antialias: bool = setting(True, "scale opacity by what the screen-space filter spread out (Mip-Splatting, eq. 9)")
     distance: bool = setting(True, "composite the distance too; without it a frame has none, and compositing is faster")
@@ -19,17 +19,8 @@ class RasterizeConfig(Settings):
     # 8 x 8 beats 16 x 16 for pixel-sized splats.
     tile: int = setting(8, "side of a tile; it must divide a panorama's width", within="[1, inf)", unit="pixels")
     chunk: int = setting(32, "Gaussians composited before joining a tile's chunks", within="[1, inf)")
-    visible_capacity: int = setting(0, "Gaussians in view; 0: measured", within="[0, inf)")
-    row_capacity: int = setting(0, "(Gaussian, row of tiles) pairs; 0: measured", within="[0, inf)")
-    pair_capacity: int = setting(0, "(Gaussian, tile) pairs; 0: measured", within="[0, inf)")
-    chunk_capacity: int = setting(0, "chunks over all tiles; 0: measured", within="[0, inf)")
 
     def __post_init__(self):
         super().__post_init__()
         if self.near >= self.far:
             raise InputError(f"near {self.near} must be below far {self.far}")
-
-    @property
-    def buffers(self) -> tuple[int, int, int, int]:
-        """The buffer sizes, in the order of `Frame.needed`."""
-        return self.visible_capacity, self.row_capacity, self.pair_capacity, self.chunk_capacity

@@ -5,6 +5,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 
+from rein3d_jax.rasterize.buffers import Buffers
 from rein3d_jax.rasterize.composite import composite_chunks
 from rein3d_jax.rasterize.config import RasterizeConfig
 from rein3d_jax.rasterize.listing import list_splats
@@ -12,14 +13,14 @@ from rein3d_jax.rasterize.pixels import from_tiles
 from rein3d_jax.scene import Camera, Gaussians
 
 
-@partial(jax.jit, static_argnames=("config",))
-def accumulated_weight(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig) -> jax.Array:
+@partial(jax.jit, static_argnames=("config", "buffers"))
+def accumulated_weight(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig, buffers: Buffers) -> jax.Array:
     """The weights (n,) sum of w_i = alpha_i T_i over pixels: what each Gaussian adds to this view; over all Gaussians
-    they sum to the picture's alpha. `config` is `allocate`'s, for a view that does not overflow.
+    they sum to the picture's alpha. `buffers` are `allocate`'s, for a view that does not overflow.
 
     The picture of a value that is v_i on Gaussian i is sum_i w_i v_i: its gradient by v is the weight.
     """
-    splats, chunks, ids, _ = list_splats(gaussians, camera, config=config)
+    splats, chunks, ids, _ = list_splats(gaussians, camera, config=config, buffers=buffers)
 
     def painted(values):
         tiles = composite_chunks(splats, values[:, None], chunks, camera, config.tile)

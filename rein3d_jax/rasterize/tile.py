@@ -1,6 +1,6 @@
 """Splats -> chunks: which Gaussians, in depth order, each tile has to composite.
 
-Buffers have the capacities of the config; what did not fit is counted, never hidden (the allocate and update pattern of
+Lists have the sizes of the buffers; what did not fit is counted, never hidden (the allocate and update pattern of
 jax-md). Nothing here is differentiated.
 """
 
@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
+from rein3d_jax.rasterize.buffers import Buffers
 from rein3d_jax.rasterize.config import RasterizeConfig
 from rein3d_jax.rasterize.pixels import grid
 from rein3d_jax.rasterize.project import Splats
@@ -63,7 +64,7 @@ def needed_pairs(splats: Splats, camera: Camera, *, config: RasterizeConfig) -> 
     return jnp.stack([jnp.sum(count), jax.lax.fori_loop(0, jnp.max(count, initial=0), add_row, jnp.int32(0))])
 
 
-def _pairs(splats: Splats, camera: Camera, config: RasterizeConfig):
+def _pairs(splats: Splats, camera: Camera, config: RasterizeConfig, buffers: Buffers):
     """Pairs of splat and tile, nearest splat first: splat (p,), tile (p,) (one past the last where unused), needed
     (2,)."""
     rows, columns = grid(camera, config.tile)
@@ -72,37 +73,37 @@ def _pairs(splats: Splats, camera: Camera, config: RasterizeConfig):
     bits = jax.lax.bitcast_convert_type(jnp.maximum(splats.distance, 0.0), jnp.int32)
     order = _argsort_packed(jnp.where(row_count > 0, bits, jnp.iinfo(jnp.int32).max))
 
-    owner, nth, used = _expand(row_count[order], config.row_capacity)
+    owner, nth, used = _expand(row_count[order], buffers.rows)
     splat = order[owner]
     row = first_row[splat] + nth
     first_column, column_count = tile_columns(splats, splat, row, camera, config=config)
     column_count = jnp.where(used, column_count, 0)
 
-    owner, nth, used = _expand(column_count, config.pair_capacity)
+    owner, nth, used = _expand(column_count, buffers.pairs)
     tile = row[owner] * columns + (first_column[owner] + nth) % columns
     needed = jnp.stack([jnp.sum(row_count), jnp.sum(column_count)])
     return splat[owner], jnp.where(used, tile, rows * columns), needed
 
 
-def bin_splats(splats: Splats, camera: Camera, *, config: RasterizeConfig) -> Chunks:
+def bin_splats(splats: Splats, camera: Camera, *, config: RasterizeConfig, buffers: Buffers) -> Chunks:
     """Sort by distance, list the tiles of every splat, sort by tile (stable), cut each tile into chunks."""
     total = splats.mean.shape[0]
     rows, columns = grid(camera, config.tile)
     tiles = rows * columns
-    splat, tile, needed = _pairs(splats, camera, config)
+    splat, tile, needed = _pairs(splats, camera, config, buffers)
     by_tile = _argsort_packed(tile)
     starts = jnp.searchsorted(tile[by_tile], jnp.arange(tiles + 1)).astype(jnp.int32)
 
     length = starts[1:] - starts[:-1]
     chunks = -(-length // config.chunk)
-    tile_of, rank, used = _expand(chunks, config.chunk_capacity)
+    tile_of, rank, used = _expand(chunks, buffers.chunks)
     first = starts[tile_of] + rank * config.chunk
     fill = jnp.where(used, jnp.minimum(starts[tile_of + 1] - first, config.chunk), 0)
 
     position = _argsort_packed(config.chunk - fill)
     order = _argsort_packed(position)
     fill, nth = fill[position], jnp.arange(config.chunk, dtype=jnp.int32)[:, None]
-    slot = jnp.minimum(first[position] + nth, config.pair_capacity - 1)
+    slot = jnp.minimum(first[position] + nth, buffers.pairs - 1)
     ids = jnp.where(nth < fill, splat[by_tile][slot], total)
     needed = jnp.concatenate([needed, jnp.sum(chunks)[None]])
     tile = jnp.where(used, tile_of, tiles)[position]

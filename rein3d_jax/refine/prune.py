@@ -11,10 +11,11 @@ from rein3d_jax.scene import Camera, Gaussians
 
 def contribution(gaussians: Gaussians, cameras: Sequence[Camera], *, config: RasterizeConfig) -> jax.Array:
     """(n,) what each adds to the views: alpha_i T_i summed over the pixels of all views, over their number."""
-    config = allocate(gaussians, cameras, config=config)
+    buffers = allocate(gaussians, cameras, config=config)
     total = jnp.zeros(gaussians.alive.shape)
     for camera in cameras:
-        total += accumulated_weight(gaussians, camera, config=config) / (camera.width * camera.height)
+        weight = accumulated_weight(gaussians, camera, config=config, buffers=buffers)
+        total += weight / (camera.width * camera.height)
     return total / len(cameras)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from flax import struct
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.rasterize import RasterizeConfig, enlarge, rasterize
+from rein3d_jax.rasterize import Buffers, RasterizeConfig, rasterize
 from rein3d_jax.refine.config import RefineConfig
 from rein3d_jax.refine.densify import densify, reset_opacity
 from rein3d_jax.refine.relocate import relocate
@@ -87,27 +87,26 @@ def _flat(evaluations: np.ndarray, config: RefineConfig) -> bool:
     return bool(np.all(np.diff(best)[-config.patience :] < config.plateau))
 
 
-def _sized(raster: RasterizeConfig, buffers) -> RasterizeConfig:
-    return enlarge(raster, *(int(x) for x in buffers))
+def _buffers(snapshot: Snapshot) -> Buffers:
+    return Buffers(*map(int, snapshot.buffers))
 
 
-def _reallocated(snapshot: Snapshot, needed: jax.Array, raster: RasterizeConfig) -> Snapshot:
+def _reallocated(snapshot: Snapshot, needed: jax.Array) -> Snapshot:
     """With buffers for what the rasterizer confessed to need, and a quarter more."""
-    grown = enlarge(_sized(raster, snapshot.buffers), *(int(x * 1.25) for x in needed))
     curves = snapshot.curves.replace(reallocated=snapshot.curves.reallocated + 1)
-    return snapshot.replace(buffers=jnp.array(grown.buffers), curves=curves)
+    return snapshot.replace(buffers=jnp.array(_buffers(snapshot).enlarged(needed, slack=1.25)), curves=curves)
 
 
 def _advance(take_step, snapshot: Snapshot, views, schedule: _Schedule, config, raster) -> Snapshot:
     """A step further; taken again with larger buffers where the rasterizer overflowed."""
     number = snapshot.step
-    batch, chance = jnp.asarray(schedule.batches[number]), Chance(schedule.backdrops[number], schedule.noise_key)
+    chance = Chance(jnp.asarray(schedule.batches[number]), schedule.backdrops[number], schedule.noise_key)
     while True:
-        sized = _sized(raster, snapshot.buffers)
-        state, metrics = take_step(snapshot.state, views, batch, chance, config=config, raster=sized)
+        buffers = _buffers(snapshot)
+        state, metrics = take_step(snapshot.state, views, chance, config=config, raster=raster, buffers=buffers)
         if int(metrics["overflow"]) == 0:
             break
-        snapshot = _reallocated(snapshot, metrics["needed"], raster)
+        snapshot = _reallocated(snapshot, metrics["needed"])
     curves = snapshot.curves
     loss = np.concatenate([curves.loss, [[number + 1, float(metrics["loss"])]]])
     curves = curves.replace(loss=loss, skipped=curves.skipped + int(metrics["skipped"]))
@@ -127,9 +126,7 @@ def _grown(snapshot: Snapshot, key, config: RefineConfig) -> Snapshot:
     return snapshot.replace(state=state, curves=curves)
 
 
-def evaluate_held_out(
-    snapshot: Snapshot, views: Views, *, config: RefineConfig, raster: RasterizeConfig
-) -> Snapshot:
+def evaluate_held_out(snapshot: Snapshot, views: Views, *, config: RefineConfig, raster: RasterizeConfig) -> Snapshot:
     """The snapshot with the PSNR of the held-out views, and the count, added to its curves; as it is where it has been
     evaluated already."""
     if snapshot.evaluated:
@@ -137,10 +134,10 @@ def evaluate_held_out(
     scene, errors = snapshot.scene, []
     for index in range(0, views.rgb.shape[0], config.views.held_out_every):
         while True:
-            frame = rasterize(scene, camera_of(views, index), config=_sized(raster, snapshot.buffers))
+            frame = rasterize(scene, camera_of(views, index), config=raster, buffers=_buffers(snapshot))
             if int(frame.overflow) == 0:
                 break
-            snapshot = _reallocated(snapshot, frame.needed, raster)
+            snapshot = _reallocated(snapshot, frame.needed)
         error = (jnp.clip(frame.rgb, 0, 1) - views.rgb[index]) ** 2
         known = views.weight[index] > 0
         errors.append(float(jnp.sum(error * known[..., None]) / jnp.maximum(3 * jnp.sum(known), 1)))

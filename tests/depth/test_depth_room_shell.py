@@ -12,6 +12,8 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.shell import RoomShell
 from rein3d_jax.geometry.sphere import pixel_rays
 
+pytestmark = pytest.mark.slow  # whole fits
+
 H, W = 256, 512  # the fit's working size: nothing is lost to resampling
 # A painted box is easy to find: a quarter of the default search does.
 CONFIG = RoomShellConfig(climbers=256, rounds=12, children=8, finalists=4)

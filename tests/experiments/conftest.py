@@ -1,4 +1,4 @@
-"""A small room with ground truth in the layout that evaluate reads: a box to walk in and one that hides a part of it."""
+"""A small room with ground truth as evaluate reads them: a box to walk in and one that hides a part of it."""
 
 import json
 from types import SimpleNamespace

@@ -6,6 +6,8 @@ import pytest
 
 import experiments
 
+pytestmark = pytest.mark.slow  # the whole notebook
+
 nbformat = pytest.importorskip("nbformat", reason="pip install nbclient ipykernel")
 nbclient = pytest.importorskip("nbclient", reason="pip install nbclient ipykernel")
 pytest.importorskip("ipykernel", reason="pip install nbclient ipykernel")

@@ -58,6 +58,7 @@ def test_share_one_is_one_for_each_pixel():
     jax.tree.map(np.testing.assert_array_equal, whole, each)
 
 
+@pytest.mark.slow
 def test_leaves_of_one_pixel_are_its_splats():
     """Where nothing may be joined, what the leaves' formulas give is `lift`'s splat."""
     config = LiftConfig(share=0.99, max_leaf_side=4, flatness=0.0)  # nothing is flat enough
@@ -69,6 +70,7 @@ def test_leaves_of_one_pixel_are_its_splats():
     np.testing.assert_allclose(ours.sh, each.sh, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_smooth_room_needs_few():
     splats = lift_adaptively(ball(), ORIGIN, EVERY, config=replace(CONFIG, share=0.0625))
     frame = shown(splats)
@@ -95,6 +97,7 @@ def test_none_straddles_a_step():
     assert np.all(np.minimum(np.abs(away - 1), np.abs(away - 3)) < 0.1)  # a leaf of 4 pixels on a ball bulges by 0.02
 
 
+@pytest.mark.slow
 def test_seen_from_where_it_was_lifted_a_leaf_lies_along_rows_and_columns():
     splats = lift_adaptively(box(), ORIGIN, EVERY, config=replace(CONFIG, share=0.5, flatness=0.02))
     ray = splats.means / jnp.linalg.norm(splats.means, axis=-1, keepdims=True)
@@ -150,6 +153,7 @@ def test_what_is_selected_is_covered_and_nothing_else():
     assert all(np.isfinite(x).all() for x in jax.tree.leaves(splats))
 
 
+@pytest.mark.slow
 def test_rooms_side_by_side():
     rooms = jax.tree.map(lambda *x: jnp.stack(x), box(0), box(1))
     both = jax.vmap(lambda room: lift_adaptively(room, ORIGIN, EVERY, config=CONFIG))(rooms)

@@ -83,6 +83,7 @@ def test_no_splat_is_longer_than_the_steepest_incidence_allows():
     np.testing.assert_allclose(scales[:, 2], LiftConfig.thickness * scales[:, 1], rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_gradients_through_a_flat_wall_are_finite():
     """Where the slope is 0 its direction is any."""
 

@@ -22,6 +22,8 @@ from rein3d_jax.restore.learned.config import NetworkConfig
 from rein3d_jax.restore.learned.loss import Example
 from rein3d_jax.restore.learned.network import initial_parameters
 
+pytestmark = pytest.mark.slow  # processes of their own with several devices
+
 DEVICES = 8
 ROOT = Path(__file__).parents[2]
 NETWORK = NetworkConfig(rows=16, fine=8, width=8, depth=1, heads=1, expand=1)

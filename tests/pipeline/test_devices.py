@@ -12,6 +12,8 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.parallel import data_mesh
 from rein3d_jax.pipeline.devices import steps_over
 
+pytestmark = pytest.mark.slow  # a process of its own with four devices
+
 ROOT = Path(__file__).parents[2]
 DEVICES = 4
 
@@ -33,7 +35,7 @@ def test_a_batch_that_cannot_be_shared_is_refused():
         batch = 4
 
     with pytest.raises(InputError, match=r"refine.batch 4 is not divided by 3 devices"):
-        steps_over(Three())(None, None, [], None, config=Config(), raster=None)
+        steps_over(Three())(None, None, None, config=Config(), raster=None, buffers=None)
     assert data_mesh(1).size == 1
 
 
@@ -53,12 +55,12 @@ def on_four_devices():
     assert jax.device_count() == DEVICES
     config = dataclasses.replace(toy.CONFIG, batch=DEVICES)
     views, start = toy.make_views(), toy.blurred(toy.make_scene())
-    chance = Chance(jax.numpy.array([0.2, 0.6, 0.9]), jax.random.key(0))
-    arguments = (views, np.array([1, 2, 3, 5]), chance)
+    chance = Chance(jax.numpy.array([1, 2, 3, 5]), jax.numpy.array([0.2, 0.6, 0.9]), jax.random.key(0))
+    fixed = {"config": config, "raster": toy.RASTER, "buffers": toy.BUFFERS}
     found = []
     for run in (take_step, steps_over(data_mesh())):
         state = initial_state(start, config, extent=2.0)
-        found.append(run(state, *arguments, config=config, raster=toy.RASTER))
+        found.append(run(state, views, chance, **fixed))
     (alone, of_one), (shared, of_four) = found
     np.testing.assert_allclose(of_four["loss"], of_one["loss"], rtol=1e-5)  # float32 sums in another order
     np.testing.assert_allclose(shared.gradient_sum, alone.gradient_sum, rtol=1e-3, atol=1e-6)  # likewise, of 256 pixels
@@ -66,9 +68,9 @@ def on_four_devices():
     for name in alone.parameters:  # Adam's first moment after one step is a tenth of the gradient
         one, four = (np.asarray(s.optimizer.inner_states[name].inner_state[0].mu[name]) for s in (alone, shared))
         np.testing.assert_allclose(four, one, atol=1e-4 * np.abs(one).max(initial=0), err_msg=name)  # float32 sums
-    tight = dataclasses.replace(toy.RASTER, pair_capacity=16)
-    _, cut = steps_over(data_mesh())(initial_state(start, config, extent=2.0), *arguments, config=config, raster=tight)
-    _, whole = take_step(initial_state(start, config, extent=2.0), *arguments, config=config, raster=tight)
+    tight = fixed | {"buffers": toy.BUFFERS._replace(pairs=16)}
+    _, cut = steps_over(data_mesh())(initial_state(start, config, extent=2.0), views, chance, **tight)
+    _, whole = take_step(initial_state(start, config, extent=2.0), views, chance, **tight)
     assert int(cut["overflow"]) == int(whole["overflow"]) > 0
     assert np.all(np.asarray(cut["needed"])[2] >= np.asarray(whole["needed"])[2])  # no less than any needs
 

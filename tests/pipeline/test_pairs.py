@@ -13,9 +13,12 @@ from rein3d_jax.geometry.poses import upright
 from rein3d_jax.geometry.shell import RoomShell, meet_shell
 from rein3d_jax.geometry.sphere import rays_of_pose
 from rein3d_jax.pipeline import pairs
-from rein3d_jax.pipeline.pairs import Drawn, PairConfig, degrade, make_pair, room_pair, scene_pair, with_buffers
+from rein3d_jax.pipeline.pairs import Drawn, PairConfig, degrade, make_pair, pair_buffers, room_pair, scene_pair
+from rein3d_jax.rasterize import Buffers
 from rein3d_jax.rooms.config import RoomConfig
 from rein3d_jax.scene import Panorama
+
+pytestmark = pytest.mark.slow  # rooms traced and degraded
 
 ROOMS = RoomConfig(boxes=16, cylinders=8, ellipsoids=8, furnished=0.3)
 CONFIG = PairConfig(height=16, frames=3, speed=4.0, rooms=ROOMS)  # 0.8 m
@@ -80,12 +83,12 @@ def test_buffers_grow_until_nothing_is_dropped(drawn, monkeypatch):
 
     def small(config):
         calls.append(config)
-        return dataclasses.replace(config, rasterize=pairs.enlarge(config.rasterize, 512, 64, 64, 64))
+        return Buffers(visible=512, rows=64, pairs=64, chunks=64)
 
     pose = drawn.pair.clean.world_from_camera
     source = Panorama(drawn.pair.clean.rgb[0], drawn.pair.clean.distance[0], jnp.ones((16, 32), bool))  # as lifted
     whole = degrade(source, pose, config=CONFIG)
-    monkeypatch.setattr(pairs, "with_buffers", small)
+    monkeypatch.setattr(pairs, "pair_buffers", small)
     grown = degrade(source, pose, config=CONFIG)
     assert calls
     np.testing.assert_allclose(grown.rgb, whole.rgb, atol=1e-5)  # sums over other buffers round otherwise
@@ -94,7 +97,7 @@ def test_buffers_grow_until_nothing_is_dropped(drawn, monkeypatch):
 
 def test_pairs_can_be_made_on_an_accelerator():
     keys = jax.random.split(jax.random.key(0), 2)
-    batch = jax.jit(jax.vmap(lambda key: room_pair(key, with_buffers(CONFIG))))
+    batch = jax.jit(jax.vmap(lambda key: room_pair(key, CONFIG, pair_buffers(CONFIG))))
     exported = jax.export.export(batch, platforms=("cuda", "tpu"))(keys)
     shapes = {(2, 3, 16, 32, 3), (2, 3, 16, 32), (2, 3, 4, 4), (2,), (2, 4)}
     assert {aval.shape for aval in exported.out_avals} == shapes
@@ -102,7 +105,7 @@ def test_pairs_can_be_made_on_an_accelerator():
 
 def test_a_path_that_no_room_has_is_refused(monkeypatch):
     short = Drawn(None, jnp.float32(2.5), jnp.int32(pairs.ATTEMPTS), jnp.zeros(4))
-    monkeypatch.setattr(pairs, "_room_pair", lambda key, config: short)
+    monkeypatch.setattr(pairs, "_room_pair", lambda key, config, buffers: short)
     with pytest.raises(InputError, match=r"none of 200 rooms has a straight path of 4 m .* the last is 2\.50 m"):
         make_pair(jax.random.key(0), dataclasses.replace(CONFIG, speed=20.0))
 
@@ -129,4 +132,4 @@ def test_a_clip_lies_within_the_path_and_goes_either_way():
 
 
 def test_buffers_are_a_function_of_the_config():
-    assert with_buffers(CONFIG) == with_buffers(CONFIG) and min(with_buffers(CONFIG).rasterize.buffers) > 0
+    assert pair_buffers(CONFIG) == pair_buffers(CONFIG) and min(pair_buffers(CONFIG)) > 0

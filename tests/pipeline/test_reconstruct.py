@@ -12,6 +12,8 @@ from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.pipeline.survey import room_background
 from rein3d_jax.restore import restorer
 
+pytestmark = pytest.mark.slow  # the whole pipeline
+
 HALF = jnp.array([2.0, 1.6, 1.3])  # metres: half sizes of the room
 HEIGHT, KEY = 64, jax.random.key(0)
 STAGES = r3d.Stages(

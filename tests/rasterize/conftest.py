@@ -1,4 +1,4 @@
-"""One small scene and one roomy configuration, so that most tests of the room share their compiled programs."""
+"""One small scene, one configuration and roomy buffers: most tests of the room share their compiled programs."""
 
 import dataclasses
 import functools
@@ -11,13 +11,13 @@ import pytest
 
 from rein3d_jax.conventions import PINHOLE
 from rein3d_jax.geometry.poses import equirectangular_camera, pinhole_camera, upright
-from rein3d_jax.rasterize import RasterizeConfig, rasterize
+from rein3d_jax.rasterize import Buffers, RasterizeConfig, rasterize
 from rein3d_jax.rasterize.reference import rasterize_reference
 from rein3d_jax.scene import Camera, Gaussians
 
 COUNT = 60
-# Room for every Gaussian in each of at most 9 tiles; chunks of 4, so that a tile has several.
-ROOMY = RasterizeConfig(chunk=4, visible_capacity=64, row_capacity=192, pair_capacity=576, chunk_capacity=160)
+CONFIG = RasterizeConfig(chunk=4)  # so that a tile has several chunks
+ROOMY = Buffers(visible=64, rows=192, pairs=576, chunks=160)  # every Gaussian in each of at most 9 tiles
 
 
 def make_scene(seed: int = 0, count: int = COUNT) -> Gaussians:
@@ -41,21 +41,26 @@ def make_camera(model: str, pose: jax.Array | None = None) -> Camera:
     return pinhole_camera(pose, 20, 1.6) if model == PINHOLE else equirectangular_camera(pose, 16)
 
 
-def picture(gaussians: Gaussians, camera: Camera, config: RasterizeConfig) -> tuple:
+def picture(gaussians: Gaussians, camera: Camera, config: RasterizeConfig, buffers: Buffers) -> tuple:
     """(rgb, alpha, distance x alpha): what the oracle returns."""
-    frame = rasterize(gaussians, camera, config=config)
+    frame = rasterize(gaussians, camera, config=config, buffers=buffers)
     return frame.rgb, frame.alpha, frame.distance * frame.alpha
 
 
-def differentiate(paint: Callable) -> Callable:
-    """(gaussians, camera, config) -> (picture, gradient by every float and by the pose) of a random linear loss."""
+def oracle(gaussians: Gaussians, camera: Camera, config: RasterizeConfig, buffers: Buffers) -> tuple:
+    """The reference, which has no buffers."""
+    return rasterize_reference(gaussians, camera, config=config)
 
-    @functools.partial(jax.jit, static_argnames=("config",))
-    def both(gaussians: Gaussians, camera: Camera, config: RasterizeConfig):
+
+def differentiate(paint: Callable) -> Callable:
+    """(gaussians, camera, config, buffers) -> (picture, gradient by every float and by the pose) of a random linear
+    loss."""
+
+    @functools.partial(jax.jit, static_argnames=("config", "buffers"))
+    def both(gaussians: Gaussians, camera: Camera, config: RasterizeConfig, buffers: Buffers = ROOMY):
         def loss(floats, pose):
-            image = paint(
-                gaussians.replace(**floats), dataclasses.replace(camera, world_from_camera=pose), config=config
-            )
+            moved = dataclasses.replace(camera, world_from_camera=pose)
+            image = paint(gaussians.replace(**floats), moved, config, buffers)
             rng = np.random.default_rng(1)  # not jax's: it draws other numbers where floats are 64 bits
             return sum(jnp.vdot(jnp.asarray(rng.normal(size=x.shape), x.dtype), x) for x in image), image
 
@@ -68,11 +73,16 @@ def differentiate(paint: Callable) -> Callable:
     return both
 
 
-FAST, SLOW = differentiate(picture), differentiate(rasterize_reference)
+FAST, SLOW = differentiate(picture), differentiate(oracle)
 
 
 @pytest.fixture
-def roomy() -> RasterizeConfig:
+def config() -> RasterizeConfig:
+    return CONFIG
+
+
+@pytest.fixture
+def roomy() -> Buffers:
     return ROOMY
 
 
@@ -88,7 +98,7 @@ def camera_of() -> Callable:
 
 @pytest.fixture
 def fast() -> Callable:
-    """Picture and gradient of `rasterize`."""
+    """Picture and gradient of `rasterize`, in roomy buffers unless others are given."""
     return FAST
 
 

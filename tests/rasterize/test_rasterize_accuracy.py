@@ -23,8 +23,9 @@ def test_image_and_gradient_equal_the_float64_oracle(model, scene_of, fast, slow
     scene = scene_of(seed=3, count=300)
     pose = upright(jnp.array([0.1, -0.2, 0.05]), 0.3, 0.2)
     camera = pinhole_camera(pose, 48, 1.6) if model == PINHOLE else equirectangular_camera(pose, 32)
-    config = allocate(scene, [camera], config=RasterizeConfig(antialias=False))
-    image, gradient = fast(scene, camera, config=config)
+    config = RasterizeConfig(antialias=False)
+    buffers = allocate(scene, [camera], config=config)
+    image, gradient = fast(scene, camera, config=config, buffers=buffers)
     with jax.enable_x64(True):
         exact = dataclasses.replace(camera, **{
             name: in_float64(getattr(camera, name)) for name in ("world_from_camera", "focal", "centre")

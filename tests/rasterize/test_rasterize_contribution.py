@@ -27,24 +27,24 @@ def dense(scene, camera, config):
 
 
 @MODELS
-def test_weights_are_the_oracles_and_sum_to_alpha(model, scene_of, camera_of, roomy) -> None:
+def test_weights_are_the_oracles_and_sum_to_alpha(model, scene_of, camera_of, config, roomy) -> None:
     scene, camera = scene_of(), camera_of(model)
-    weight = accumulated_weight(scene, camera, config=roomy)
-    order, alpha = dense(scene, camera, roomy)
+    weight = accumulated_weight(scene, camera, config=config, buffers=roomy)
+    order, alpha = dense(scene, camera, config)
     through = np.cumprod(1 - alpha, axis=0)
     expected = np.zeros(len(order))
     expected[order] = (alpha * np.concatenate([np.ones_like(through[:1]), through[:-1]])).sum((1, 2))
     # alpha rounds to 3e-6 of itself here, a float32 sum of n = 512 positive terms to sqrt(n) eps = 3e-6 of their sum.
     np.testing.assert_allclose(weight, expected, rtol=2e-5, atol=1e-5)
-    total = float(rasterize(scene, camera, config=roomy).alpha.sum())
+    total = float(rasterize(scene, camera, config=config, buffers=roomy).alpha.sum())
     np.testing.assert_allclose(float(weight.sum()), total, rtol=1e-4)  # as above, of 60 x 512 terms: 2e-5
     assert not np.any(np.asarray(weight)[~np.asarray(scene.alive)])
 
 
-def test_without_distance_the_rest_stays_and_there_is_none(scene_of, camera_of, roomy) -> None:
+def test_without_distance_the_rest_stays_and_there_is_none(scene_of, camera_of, config, roomy) -> None:
     camera = camera_of(PINHOLE)
-    bare = rasterize(scene_of(), camera, config=dataclasses.replace(roomy, distance=False))
-    whole = rasterize(scene_of(), camera, config=roomy)
+    bare = rasterize(scene_of(), camera, config=dataclasses.replace(config, distance=False), buffers=roomy)
+    whole = rasterize(scene_of(), camera, config=config, buffers=roomy)
     assert bare.distance is None
     np.testing.assert_allclose(bare.rgb, whole.rgb, atol=5e-6)  # the same sums, vectorised otherwise
     assert jnp.all(whole.distance >= 0)

@@ -78,11 +78,11 @@ def test_picture_and_gradient_agree() -> None:
     z = workload.means[:, 2]
     assert np.array_equal(np.argsort(z), np.argsort(np.linalg.norm(workload.means, axis=1)))
     scene, camera, target = scene_of(workload), camera_of(workload), jnp.asarray(workload.target)
-    config = allocate(scene, [camera], config=CONFIG)
+    buffers = allocate(scene, [camera], config=CONFIG)
 
     def loss(means, log_scales, quats):
         moved = scene.replace(means=means, log_scales=log_scales, quats=quats)
-        image = rasterize(moved, camera, config=config).rgb
+        image = rasterize(moved, camera, config=CONFIG, buffers=buffers).rgb
         return jnp.mean((image - target) ** 2), image
 
     gradient = jax.grad(loss, argnums=(0, 1, 2), has_aux=True)

@@ -17,9 +17,9 @@ MODELS = pytest.mark.parametrize("model", [PINHOLE, EQUIRECTANGULAR])
 
 @MODELS
 @pytest.mark.parametrize("antialias", [True, False])
-def test_value_and_gradient_equal_the_oracle(model, antialias, scene_of, camera_of, roomy, fast, slow) -> None:
+def test_value_and_gradient_equal_the_oracle(model, antialias, scene_of, camera_of, config, fast, slow) -> None:
     """The pinhole image is no whole number of tiles wide; the panorama's splats lie over poles and seam."""
-    config = dataclasses.replace(roomy, antialias=antialias)
+    config = dataclasses.replace(config, antialias=antialias)
     image, gradient = fast(scene_of(), camera_of(model), config=config)
     oracle, expected = slow(scene_of(), camera_of(model), config=config)
     for actual, value in zip(image, oracle, strict=True):
@@ -35,7 +35,7 @@ def test_value_and_gradient_equal_the_oracle(model, antialias, scene_of, camera_
 
 
 @pytest.mark.parametrize("columns", [5, 16])  # no multiple of a tile, and half a turn
-def test_a_yawed_scene_gives_a_rolled_panorama(columns, scene_of, camera_of, roomy, fast) -> None:
+def test_a_yawed_scene_gives_a_rolled_panorama(columns, scene_of, camera_of, config, fast) -> None:
     scene = scene_of()
     scene = scene.replace(sh=scene.sh.at[:, 1:].set(0.0))  # directional colour would have to turn along
     yaw = matrix_from_quats(yaw_quat(columns / 32 * 2 * np.pi))
@@ -43,8 +43,8 @@ def test_a_yawed_scene_gives_a_rolled_panorama(columns, scene_of, camera_of, roo
     axes = jnp.matmul(yaw, matrix_from_quats(scene.quats), precision="highest")
     turned = scene.replace(means=means, quats=quats_from_matrix(axes))
     camera = camera_of(EQUIRECTANGULAR, upright(jnp.zeros(3)))
-    image, _ = fast(scene, camera, config=roomy)
-    rolled, _ = fast(turned, camera, config=roomy)
+    image, _ = fast(scene, camera, config=config)
+    rolled, _ = fast(turned, camera, config=config)
     for before, after in zip(image, rolled, strict=True):
         # Columns turn right, the scene turns left. The rotation rounds directions to 1e-7, of splats as thin as
         # a hundredth of a radian.
@@ -52,25 +52,25 @@ def test_a_yawed_scene_gives_a_rolled_panorama(columns, scene_of, camera_of, roo
 
 
 @MODELS
-def test_same_inputs_same_bytes(model, scene_of, camera_of, roomy, fast) -> None:
-    once, again = (jax.tree.leaves(fast(scene_of(), camera_of(model), config=roomy)) for _ in range(2))
+def test_same_inputs_same_bytes(model, scene_of, camera_of, config, fast) -> None:
+    once, again = (jax.tree.leaves(fast(scene_of(), camera_of(model), config=config)) for _ in range(2))
     for a, b in zip(once, again, strict=True):
         assert np.asarray(a).tobytes() == np.asarray(b).tobytes()
 
 
 @MODELS
-def test_an_empty_scene_is_black(model, scene_of, camera_of, roomy, fast) -> None:
+def test_an_empty_scene_is_black(model, scene_of, camera_of, config, fast) -> None:
     scene = scene_of()
     dead = scene.replace(alive=jnp.zeros_like(scene.alive))
-    for leaf in jax.tree.leaves(fast(dead, camera_of(model), config=roomy)):
+    for leaf in jax.tree.leaves(fast(dead, camera_of(model), config=config)):
         assert not np.any(leaf)
 
 
-def test_one_vmap_over_cameras_equals_calls_one_by_one(scene_of, camera_of, roomy) -> None:
+def test_one_vmap_over_cameras_equals_calls_one_by_one(scene_of, camera_of, config, roomy) -> None:
     poses = jnp.stack([upright(jnp.zeros(3), 0.3), upright(jnp.array([0.3, 0.0, 0.1]), 2.0, -0.4)])
 
     def view(pose):
-        return rasterize(scene_of(), camera_of(PINHOLE, pose), config=roomy)
+        return rasterize(scene_of(), camera_of(PINHOLE, pose), config=config, buffers=roomy)
 
     together = jax.vmap(view)(poses)
     for i, pose in enumerate(poses):
@@ -79,8 +79,8 @@ def test_one_vmap_over_cameras_equals_calls_one_by_one(scene_of, camera_of, room
 
 
 @MODELS
-def test_value_and_gradient_lower_for_every_platform(model, scene_of, camera_of, roomy, fast) -> None:
+def test_value_and_gradient_lower_for_every_platform(model, scene_of, camera_of, config, fast) -> None:
     platforms = ("cpu", "cuda", "tpu")
-    both = jax.jit(lambda scene, camera: fast(scene, camera, config=roomy))
+    both = jax.jit(lambda scene, camera: fast(scene, camera, config=config))
     exported = jax.export.export(both, platforms=platforms)(scene_of(), camera_of(model))
     assert exported.platforms == platforms

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rein3d_jax.conventions import EQUIRECTANGULAR, PINHOLE
-from rein3d_jax.rasterize import RasterizeConfig, accumulated_weight, rasterize, render
+from rein3d_jax.rasterize import accumulated_weight, rasterize, render
 
 
 def hostile(scene, camera, seed: int):
@@ -32,25 +32,30 @@ def hostile(scene, camera, seed: int):
 
 
 @pytest.mark.parametrize("model", [PINHOLE, EQUIRECTANGULAR])
-def test_outputs_and_gradients_are_finite(model, scene_of, camera_of, roomy, fast) -> None:
+def test_outputs_and_gradients_are_finite(model, scene_of, camera_of, config, fast) -> None:
     camera = camera_of(model)
     seen = 0.0
     for seed in range(12):
-        image, gradient = fast(hostile(scene_of(), camera, seed), camera, config=roomy)
+        image, gradient = fast(hostile(scene_of(), camera, seed), camera, config=config)
         for path, leaf in jax.tree.leaves_with_path((image, gradient)):
             assert np.all(np.isfinite(leaf)), (seed, jax.tree_util.keystr(path))
         seen += float(image[1].mean())
     assert seen / 12 > 0.01  # and something is drawn
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", [PINHOLE, EQUIRECTANGULAR])
-def test_scenes_of_no_and_of_one_gaussian(model, scene_of, camera_of) -> None:
+def test_scenes_of_no_and_of_one_gaussian(model, scene_of, camera_of, config) -> None:
     camera = camera_of(model)
     for count in (0, 1):
         scene = jax.tree.map(lambda x: x[:count], scene_of())  # noqa: B023
-        frame, config = render(scene, camera, config=RasterizeConfig())
-        gradient = jax.grad(lambda x: jnp.sum(rasterize(x, camera, config=config).rgb), allow_int=True)(scene)  # noqa: B023
-        weight = accumulated_weight(scene, camera, config=config)
+        frame, buffers = render(scene, camera, config=config)
+
+        def total(scene, buffers=buffers):
+            return jnp.sum(rasterize(scene, camera, config=config, buffers=buffers).rgb)
+
+        gradient = jax.grad(total, allow_int=True)(scene)
+        weight = accumulated_weight(scene, camera, config=config, buffers=buffers)
         assert weight.shape == gradient.opacity_logits.shape == (count,)
         # float32 sums of n = 512 positive terms in another order: sqrt(n) eps = 3e-6 of the sum.
         np.testing.assert_allclose(float(weight.sum()), float(frame.alpha.sum()), rtol=1e-5)

@@ -10,14 +10,15 @@ import pytest
 
 from rein3d_jax.geometry.pinhole import focal_from_fov
 from rein3d_jax.geometry.poses import pinhole_camera, upright
-from rein3d_jax.rasterize import RasterizeConfig, rasterize
+from rein3d_jax.rasterize import Buffers, RasterizeConfig, rasterize
 from rein3d_jax.refine import DensifyConfig, RefineConfig, Views, ViewsConfig, first_snapshot, refine
 from rein3d_jax.scene import Gaussians
 
 COUNT, SPARE, SIZE, VIEWS = 40, 20, 16, 12
 EXTENT = 2.0  # metres
+RASTER = RasterizeConfig()
 # Roomier than `refine` would ask for, so that it keeps these buffers and the tests share one compiled step.
-RASTER = RasterizeConfig(visible_capacity=96, row_capacity=256, pair_capacity=512, chunk_capacity=128)
+BUFFERS = Buffers(visible=96, rows=256, pairs=512, chunks=128)
 CONFIG = RefineConfig(
     steps=10, batch=2, evaluate_every=5, sh_degree=1, sh_degree_every=4, min_scale=0.0,
     views=ViewsConfig(size=SIZE, held_out_every=4),
@@ -44,7 +45,7 @@ def make_views(scale: float = 1.0) -> Views:
         pinhole_camera(upright(scale * 0.3 * jnp.array([np.cos(a), np.sin(a), 0.1]), 1.7 * a), SIZE, np.pi / 2)
         for a in np.arange(VIEWS)
     ]
-    rgb = jnp.stack([rasterize(make_scene(scale), camera, config=RASTER).rgb for camera in cameras])
+    rgb = jnp.stack([rasterize(make_scene(scale), c, config=RASTER, buffers=BUFFERS).rgb for c in cameras])
     poses = jnp.stack([camera.world_from_camera for camera in cameras])
     focal = jnp.full(VIEWS, focal_from_fov(np.pi / 2, SIZE), jnp.float32)
     return Views(rgb, jnp.ones((VIEWS, SIZE, SIZE)), poses, focal)
@@ -68,6 +69,7 @@ def fit() -> Callable:
 
     def snapshots(start, views, config, fixed=None):
         first = first_snapshot(start, views, extent=EXTENT, config=config, raster=RASTER, fixed=fixed)
+        first = first.replace(buffers=jnp.array(BUFFERS))
         return list(refine(first, views, jax.random.key(0), config=config, raster=RASTER))
 
     return snapshots
@@ -81,3 +83,8 @@ def config() -> RefineConfig:
 @pytest.fixture
 def raster() -> RasterizeConfig:
     return RASTER
+
+
+@pytest.fixture
+def buffers() -> Buffers:
+    return BUFFERS

@@ -15,14 +15,15 @@ def weighed(toy, raster):
     return scene, cameras, contribution(scene, cameras, config=raster)
 
 
-def alphas(scene, cameras, raster):
-    return np.stack([np.asarray(rasterize(scene, camera, config=raster).alpha) for camera in cameras])
+def alphas(scene, cameras, raster, buffers):
+    frames = [rasterize(scene, camera, config=raster, buffers=buffers) for camera in cameras]
+    return np.stack([np.asarray(frame.alpha) for frame in frames])
 
 
-def test_contributions_sum_to_the_mean_alpha(weighed, raster) -> None:
+def test_contributions_sum_to_the_mean_alpha(weighed, raster, buffers) -> None:
     scene, cameras, weight = weighed
     # float32 sums of 256 pixels by 12 views in another order
-    np.testing.assert_allclose(weight.sum(), alphas(scene, cameras, raster).mean(), rtol=1e-4)
+    np.testing.assert_allclose(weight.sum(), alphas(scene, cameras, raster, buffers).mean(), rtol=1e-4)
     assert not np.any(np.asarray(weight)[~np.asarray(scene.alive)])
 
 

@@ -1,26 +1,29 @@
 """Laws of one optimisation step."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from rein3d_jax.refine.state import initial_state
 from rein3d_jax.refine.step import Chance, take_step
 
-BEFORE_BLACK = Chance(jnp.zeros(3), jax.random.key(0))
-FIRST = jnp.array([1, 2])
+FIRST = Chance(jnp.array([1, 2]), jnp.zeros(3), jax.random.key(0))
 EXTENT = 2.0
 
 
-def step(state, views, *, config, raster):
-    """One step on views 1 and 2."""
-    return take_step(state, views, FIRST, BEFORE_BLACK, config=config, raster=raster)
+@pytest.fixture
+def step(config, raster, buffers):
+    """(state, views) -> one step on views 1 and 2, before black."""
+    return partial(take_step, chance=FIRST, config=config, raster=raster, buffers=buffers)
 
 
-def test_a_step_moves_what_is_seen_and_stays_finite(toy, config, raster) -> None:
+def test_a_step_moves_what_is_seen_and_stays_finite(toy, config, step) -> None:
     _, views, start = toy()
     state = initial_state(start, config, extent=EXTENT)
-    new, metrics = step(state, views, config=config, raster=raster)
+    new, metrics = step(state, views)
     assert not metrics["skipped"] and int(metrics["overflow"]) == 0 and int(new.step) == 1
     assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(new))
     moved = np.any(np.asarray(new.parameters["sh"] != state.parameters["sh"]), axis=(1, 2))
@@ -29,23 +32,23 @@ def test_a_step_moves_what_is_seen_and_stays_finite(toy, config, raster) -> None
     np.testing.assert_array_equal(new.parameters["sh_rest"], state.parameters["sh_rest"])  # degree 1 waits
 
 
-def test_a_batch_without_finite_gradient_changes_nothing_and_is_counted(toy, config, raster) -> None:
+def test_a_batch_without_finite_gradient_changes_nothing_and_is_counted(toy, config, step) -> None:
     _, views, start = toy()
     state = initial_state(start, config, extent=EXTENT)
     batch = views.replace(rgb=views.rgb.at[2, 7, 7, 0].set(jnp.nan))
-    new, metrics = step(state, batch, config=config, raster=raster)
+    new, metrics = step(state, batch)
     assert metrics["skipped"] and int(new.step) == 1
     for before, after in zip(jax.tree.leaves(state.replace(step=new.step)), jax.tree.leaves(new), strict=True):
         np.testing.assert_array_equal(before, after)
 
 
-def test_a_step_does_not_depend_on_the_unit_of_length(toy, config, raster) -> None:
+def test_a_step_does_not_depend_on_the_unit_of_length(toy, config, step) -> None:
     """Scene, poses and extent times 10 give the scene times 10."""
     scale, states = 10.0, []
     for factor in (1.0, scale):
         _, views, start = toy(factor)
         state = initial_state(start, config, extent=EXTENT * factor)
-        states.append(step(state, views, config=config, raster=raster)[0].parameters)
+        states.append(step(state, views)[0].parameters)
     small, large = states
     comparable = large | {"means": large["means"] / scale, "log_scales": large["log_scales"] - np.log(scale)}
     rates = {

@@ -90,6 +90,7 @@ def oracle(room, pose):
     return distance.reshape(shape), ids.reshape(shape)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", range(6))
 def test_distance_is_that_of_every_primitive_tried_in_float64(index, room_of, tracer, pose_at):
     room = room_of(index)
@@ -118,6 +119,7 @@ def test_open_windows_have_a_colour_and_no_distance(many_rooms, room_of, tracer,
     assert names <= {6 + i for i in range(room.openings.wall.shape[0]) if room.openings.window[i] > 0.5}
 
 
+@pytest.mark.slow
 def test_the_share_of_open_windows_is_the_config_s():
     keys = jax.random.split(jax.random.key(3), 64)
     for share in (0.0, 0.5, 1.0):

@@ -68,6 +68,7 @@ def test_a_box_under_a_lamp_leaves_a_shadow_and_only_there(room_of, tracer, pose
     assert floor[row, behind] and ratio[row, behind] > 0.95
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", range(3))
 def test_textures_hold_nothing_finer_than_pixels(index, room_of, tracer, pose_at, without_solids):
     """One ray a pixel equals the mean of 4 x 4, which is a panorama of 256 rows averaged over areas.

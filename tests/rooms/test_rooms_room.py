@@ -26,6 +26,7 @@ def plan_corners(centre, half, heading):
     return centre[:, None, :2] + np.stack([c * x - s * y, s * x + c * y], -1)
 
 
+@pytest.mark.slow
 def test_same_key_same_bytes_and_vmap_is_a_loop(many_rooms):
     closed = RoomConfig(open_windows=0.0)
     make, keys = jax.jit(lambda key: generate_room(key, closed)), jax.random.split(jax.random.key(7), 64)

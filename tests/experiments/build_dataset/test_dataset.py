@@ -189,6 +189,7 @@ def scenes(tmp_path):
     return dataset.SceneConfig(folder=str(folder), up="z")
 
 
+@pytest.mark.slow
 def test_two_ray_workers_write_what_one_process_does(scenes, tmp_path):
     config = DatasetConfig(str(tmp_path / "one"), clips=4, clips_per_shard=1, scenes=scenes, pairs=TINY)
     one = build(config)
@@ -212,6 +213,7 @@ def test_houses_give_a_place_for_each_room(tmp_path, monkeypatch):
         pair_scenes.scene_places(pair_scenes.SceneConfig(folder=str(tmp_path)))
 
 
+@pytest.mark.slow
 def test_a_worker_of_ray_says_what_is_at_fault(tmp_path):
     scenes = dataset.SceneConfig(folder=str(tmp_path / "nowhere"))
     with pytest.raises(InputError, match="nowhere is no folder"):

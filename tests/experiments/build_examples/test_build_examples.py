@@ -2,8 +2,11 @@
 
 import jax
 import numpy as np
+import pytest
 
 from experiments.build_examples.example import ExamplesConfig, example
+
+pytestmark = pytest.mark.slow  # rooms traced, degraded and filled
 
 CONFIG = ExamplesConfig(height=32, frames=2)
 

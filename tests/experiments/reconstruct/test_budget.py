@@ -10,6 +10,8 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.pipeline.stages import Stages
 from rein3d_jax.refine import RefineConfig
 
+pytestmark = pytest.mark.slow  # whole jobs
+
 
 def run(recipe, output, *settings):
     changes = [item for setting in settings for item in ("--set", setting)]

@@ -24,6 +24,8 @@ from rein3d_jax.pipeline.survey import with_distance
 from rein3d_jax.rasterize import RasterizeConfig, render
 from rein3d_jax.refine import RefineConfig
 
+pytestmark = pytest.mark.slow  # whole jobs
+
 
 @pytest.fixture(scope="module")
 def finished(recipe, tmp_path_factory):

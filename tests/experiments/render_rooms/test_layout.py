@@ -22,6 +22,7 @@ def rooms():
     return [plan_room(seed, CATALOG, ShotList(walk_frames=9)) for seed in SEEDS]
 
 
+@pytest.mark.slow
 def test_a_seed_is_one_room_for_ever(rooms):
     assert json.dumps(plan_room(3, CATALOG, ShotList(walk_frames=9))) == json.dumps(rooms[3])
     assert len({json.dumps(room["corners"]) for room in rooms}) == len(rooms)

@@ -27,6 +27,8 @@ from rein3d_jax.restore.learned.config import NetworkConfig
 from rein3d_jax.restore.learned.loss import Example
 from rein3d_jax.restore.restorer import RestoreConfig
 
+pytestmark = pytest.mark.slow  # whole trainings
+
 ROWS, FRAMES, COUNTED, STEPS = 16, 3, 6, 4
 
 

@@ -28,6 +28,8 @@ from rein3d_jax.restore.wan.training.lora import LoraConfig
 from rein3d_jax.restore.wan.training.trainable import TrainableConfig
 from rein3d_jax.scene import Pair, Video
 
+pytestmark = pytest.mark.slow  # whole trainings
+
 FRAMES, HEIGHT, WIDTH, PAIRS = 5, 32, 64, 4
 RECIPES = Path(__file__).parents[3] / "experiments" / "recipes"
 # A stride of 4 pixels, so 16 channels of mask: the VAE is most of what has to be compiled.

@@ -156,6 +156,7 @@ def loss_and_gradient(params, text):
     return jax.value_and_grad(loss)(params)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", TRAINABLE_PARTS)
 def test_steps_go_down_and_move_what_is_trained_and_nothing_else(shallow_dit, golden_dit, part):
     config, optimizer, text = trainable(part), optax.sgd(0.02), jnp.asarray(golden_dit["text"])
