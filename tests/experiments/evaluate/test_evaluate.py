@@ -11,6 +11,8 @@ from experiments.evaluate import __main__ as evaluate
 from experiments.evaluate import protocols
 from experiments.evaluate.room import room_sources
 
+pytestmark = pytest.mark.slow  # whole evaluations
+
 RECIPE = """
 [input]
 height = 64
@@ -95,7 +97,7 @@ def test_means_and_errors_by_hand(finished):
                 # float32 statistics of values rounded to six digits
                 np.testing.assert_allclose(row["mean"], values.mean(), rtol=1e-5, atol=1e-9)
                 if len(values) == 2:
-                    slack = 2e-6 * np.abs(values).max()  # what is left of the difference of two such values
+                    slack = 5e-6 * np.abs(values).max()  # six digits: each value is off by up to 5e-6 of itself
                     np.testing.assert_allclose(row["sem"], abs(values[0] - values[1]) / 2, rtol=1e-4, atol=slack)
 
 
