@@ -20,8 +20,8 @@ class DepthDataConfig(Settings):
     share: float = setting(0.5, "of a batch that is rendered", within="[0, 1]")
     held_out: int = setting(10, "every so many rendered rooms, the first is never trained on", within="[2, inf)")
     drawn_held_out: int = setting(16, "drawn rooms of the evaluation", within="[0, inf)")
-    below: float = setting(0.7, "the eye's height, as far as a camera in a drawn room may stand", unit="metres")
-    above: float = setting(0.4, "the eye's height, as far as a camera in a drawn room may stand", unit="metres")
+    below: float = setting(0.7, "the eye's height, at most, of a drawn room's camera", within="[0, inf)", unit="metres")
+    above: float = setting(0.4, "the eye's height, at most, of a drawn room's camera", within="[0, inf)", unit="metres")
     jpeg: float = setting(0.3, "share that is compressed, at a quality of 30 to 95", within="[0, 1]")
     rooms: RoomConfig = RoomConfig()
 
