@@ -13,7 +13,7 @@ from rein3d_jax.io.files.json_file import read_json
 from rein3d_jax.io.files.npy import read_arrays
 from rein3d_jax.io.pictures.image import read_rgb
 
-_SEEN_AGAIN = 4  # every so many panoramas of a walk are taken: those between show the same
+_SEEN_AGAIN = 2  # every so many panoramas of a walk are taken: those between show the same
 
 
 class RenderedRooms:

@@ -23,7 +23,10 @@ class DepthNetworkConfig(Settings):
     horizon: int = setting(192, "channels of a column of the horizon branch", within=_COUNT)
     heads: int = setting(4, "of the horizon branch's attention; divide `horizon`", within=_COUNT)
     layers: int = setting(3, "of the horizon branch", within=_COUNT)
-    bands: int = setting(8, "of latitude, to which the horizon branch averages rows", within=_COUNT)
+    bands: int = setting(
+        32, "of latitude, to which the horizon branch averages rows at stride 4; half as many at 8, a quarter above",
+        within="[4, inf)",
+    )  # fmt: skip
     decoder: tuple[int, int, int, int, int] = setting(
         (128, 96, 64, 48, 32), "channels of the decoder at strides 32, 16, 8, 4, 2", within=_COUNT
     )

@@ -92,9 +92,9 @@ class Horizon(nn.Module):
     def __call__(self, features: list[jax.Array]) -> tuple[jax.Array, jax.Array]:
         config, count = self.config, features[0].shape[2]
         columns = 0.0
-        for grid in features:
+        for halvings, grid in enumerate(features):
             small = nn.gelu(nn.Dense(min(grid.shape[-1], 64))(grid))
-            squeezed = nn.Dense(config.horizon)(bands_of(small, config.bands))
+            squeezed = nn.Dense(config.horizon)(bands_of(small, config.bands >> min(halvings, 2)))
             columns = columns + to_columns(squeezed, count)
         for _ in range(config.layers):
             columns = HorizonLayer(config.heads)(columns)
