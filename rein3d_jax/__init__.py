@@ -25,6 +25,7 @@ _DOORS = {
     "render": "rasterize",
     "read_panorama": "io.pictures.panorama",
     "read_network": "networks.trained",
+    "read_depth_network": "networks.depth",
     **dict.fromkeys(("read_splats", "write_splats"), "io.splats.gaussian_file"),
     **dict.fromkeys(("Decisions", "Reconstruction", "reconstruct"), "pipeline.reconstruct"),
     "Stages": "pipeline.stages",

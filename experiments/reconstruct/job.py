@@ -19,7 +19,8 @@ from experiments.reconstruct.run import Run
 from experiments.reconstruct.stage_store import StageStore
 from rein3d_jax.explore.trajectories import radial_trajectories
 from rein3d_jax.io.files.atomic import write_text
-from rein3d_jax.networks.trained import read_network, weights_fingerprint
+from rein3d_jax.networks.depth import SHIPPED_DEPTH, read_depth_network
+from rein3d_jax.networks.trained import files_digest, read_network, weights_fingerprint
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
 from rein3d_jax.pipeline.reconstruct import ALL_PATHS, Reconstruction, joined
 from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene
@@ -71,10 +72,12 @@ def _header() -> str:
 
 
 def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool]:
-    """Everything up to the refined scene, and whether the distance was fitted."""
+    """Everything up to the refined scene, and whether the distance was estimated."""
     config, key = job.config, jax.random.key(job.config.seed)
-    depends = [files, config.input.height, job.settings("depth"), job.settings("shell"), jax.__version__]
-    panorama, fitted = job.stage("read", depends, lambda: _read(config))
+    network = config.input.distance is None and config.depth.method == "network"
+    weights = files_digest(SHIPPED_DEPTH) if network else ""
+    depends = [files, config.input.height, job.settings("depth"), job.settings("shell"), weights, jax.__version__]
+    panorama, estimated = job.stage("read", depends, lambda: _read(config, weights))
     coarse = job.stage("lift", job.settings("lift"), lambda: lift_scene(panorama, config.lift))
     trajectories = job.stage(
         "explore", job.settings("explore"), lambda: radial_trajectories(panorama, config=config.explore)
@@ -85,12 +88,13 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool]:
         "refine", job.settings("refine"), lambda: _refined(job, known, explored, jax.random.fold_in(key, 1))
     )
     why = ALL_PATHS if len(explored) == config.explore.trajectories else OUT_OF_TIME
-    return joined(known, explored, (scene, curves, stopped), why), bool(fitted[0])
+    return joined(known, explored, (scene, curves, stopped), why), bool(estimated[0])
 
 
-def _read(config: ReconstructConfig):
-    panorama, fitted = with_distance(input_panorama(config.input), config)
-    return panorama, np.array([fitted])
+def _read(config: ReconstructConfig, weights: str):
+    network = read_depth_network() if weights else None
+    panorama, estimated = with_distance(input_panorama(config.input), config, network)
+    return panorama, np.array([estimated])
 
 
 def _explored(job: _Job, known: Survey, key: jax.Array) -> Iterator[Explored]:

@@ -43,7 +43,7 @@ def write_outputs(run: Run, store: StageStore, clock: Clock) -> dict:
         **run_metrics.size(result, output / "scene.ply"),
         **run_metrics.trouble(result),
         **run_metrics.choices(result, store, config.explore),
-        "distance": "room-shell estimate" if run.fitted else "given",
+        "distance": run.distance_origin,
         "recipe": recipe_digest(output / "config.toml"),
         "coverage": {"coarse": round(seen, 4), "refined": round(covered, 4)},
     }

@@ -17,8 +17,14 @@ class Run:
 
     config: ReconstructConfig
     result: Reconstruction
-    fitted: bool  # whether the distance is a fitted box's
+    estimated: bool  # whether the distance was, by stages.depth.method
     views: list[View]  # ground truth
+
+    @property
+    def distance_origin(self) -> str:
+        """Where the distance came from, in few words."""
+        estimate = {"shell": "room-shell estimate", "network": "depth network's estimate"}
+        return estimate[self.config.depth.method] if self.estimated else "given"
 
     @property
     def backdrop(self) -> jax.Array:

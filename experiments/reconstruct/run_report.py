@@ -49,18 +49,21 @@ def run_report(run: Run, pictures: Pictures, metrics: dict) -> Report:
 
 
 def _distance_origin(run: Run) -> str:
-    if not run.fitted:
+    if not run.estimated:
         return "given with the panorama."
-    return (
-        "room-shell estimate. The photograph came without depth, so an empty box was fitted to its wall, floor and "
-        "ceiling edges: furniture is painted onto it, and sizes follow the camera height you set."
-    )
+    how = {
+        "shell": "an empty box was fitted to its wall, floor and ceiling edges: furniture is painted onto it",
+        "network": "a network that has seen other rooms said how far each pixel is",
+    }[run.config.depth.method]
+    said = f"{run.distance_origin}. The photograph came without depth, so {how}"
+    return f"{said}, and sizes follow the camera height you set."
 
 
 def _warnings(run: Run, metrics: dict):
     trajectories, paths = run.result.trajectories, len(run.result.videos)
-    if run.fitted:
-        yield "The distance is a fitted empty room: furniture will look flat from the side. Give --distance for depth."
+    if run.estimated:
+        if run.config.depth.method == "shell":
+            yield "The distance is that of an empty room: furniture will look flat from the side. Give --distance."
         yield (
             "The scale is a guess: every length follows the height of the camera above the floor. Measure it and give "
             "it with --set shell.camera_height."

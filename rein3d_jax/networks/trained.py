@@ -30,7 +30,14 @@ def weights_fingerprint(config: RestoreConfig) -> str:
     """Hash of the weights' files: a resumed job must not mix two networks. Empty for the fills."""
     if config.method not in (LEARNED, DIFFUSION):
         return ""
-    path, digest = Path(config.weights or SHIPPED_RESTORER), hashlib.sha256()
+    return files_digest(Path(config.weights or SHIPPED_RESTORER))
+
+
+def files_digest(path: Path) -> str:
+    """Hash of a weights file, or of a folder's safetensors. Raises InputError where there is none."""
+    if not path.exists():
+        raise InputError(f"{path} is not there: the weights do not come with this version")
+    digest = hashlib.sha256()
     for file in sorted(path.rglob("*.safetensors")) if path.is_dir() else [path]:
         with open(file, "rb") as content:
             digest.update(hashlib.file_digest(content, "sha256").digest())

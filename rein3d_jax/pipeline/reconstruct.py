@@ -45,9 +45,9 @@ def reconstruct(
 ) -> Reconstruction:
     """The scene of a panorama (h, 2 h): lifted, explored, restored and refined (paper Sec. 3).
 
-    Distances that are not `valid` are completed; where none is, an empty box is fitted to the picture. `network` is the
-    trained restorer, where stages.restore names one. Runs outside jit; every stage in it is compiled. The same key
-    gives the same bytes.
+    Distances that are not `valid` are completed; where none is, an empty box is fitted to the picture (`with_distance`
+    estimates better ones). `network` is the trained restorer, where stages.restore names one. Runs outside jit; every
+    stage in it is compiled. The same key gives the same bytes.
     """
     panorama, _ = with_distance(panorama, stages)
     known = survey(panorama, stages)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 
-from rein3d_jax.depth.complete import CompleteConfig
+from rein3d_jax.depth.estimate import DepthConfig
 from rein3d_jax.depth.room_shell import RoomShellConfig
 from rein3d_jax.explore.profile import ExploreConfig
 from rein3d_jax.geometry.poses import equirectangular_camera, rigid
@@ -23,7 +23,7 @@ class Stages(Settings):
     """One config for each stage."""
 
     shell: RoomShellConfig = RoomShellConfig()  # where no distance is given
-    depth: CompleteConfig = CompleteConfig()
+    depth: DepthConfig = DepthConfig()
     lift: LiftConfig = LiftConfig()
     explore: ExploreConfig = ExploreConfig()
     rasterize: RasterizeConfig = RasterizeConfig()

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import rein3d_jax as r3d
+from rein3d_jax.depth.estimate import DepthConfig
+from rein3d_jax.depth.network.network import initial_depth_parameters
 from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.pipeline.survey import room_background
 from rein3d_jax.restore import restorer
@@ -81,3 +83,15 @@ def test_without_a_known_distance_a_box_is_fitted(panorama) -> None:
     placed, fitted = r3d.with_distance(unknown, STAGES)
     assert fitted and bool(placed.valid.all()) and float(placed.distance.min()) > 0
     assert not r3d.with_distance(panorama, STAGES)[1]
+
+
+def test_a_network_s_estimate_is_metres_by_the_camera_s_height(panorama) -> None:
+    """An untrained network will do: twice the height, twice all distances."""
+    stages = dataclasses.replace(STAGES, depth=DepthConfig(method="network"))
+    unknown, network = panorama.replace(valid=jnp.zeros_like(panorama.valid)), initial_depth_parameters(KEY)
+    shells = [dataclasses.replace(stages.shell, camera_height=height) for height in (1.2, 2.4)]
+    low, high = (r3d.with_distance(unknown, dataclasses.replace(stages, shell=x), network)[0] for x in shells)
+    assert bool(jnp.isfinite(low.distance).all()) and float(low.distance.min()) > 0
+    np.testing.assert_allclose(high.distance, 2 * low.distance, rtol=1e-5)  # float32
+    with pytest.raises(r3d.InputError, match="read_depth_network"):
+        r3d.with_distance(unknown, stages)
