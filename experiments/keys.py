@@ -78,12 +78,14 @@ def _recipes() -> dict[str, tuple[type, ...]]:
     from experiments.build_dataset.dataset import DatasetConfig
     from experiments.build_examples.example import ExamplesConfig
     from experiments.reconstruct.config import ReconstructConfig
+    from experiments.train_depth.config import DepthTrainConfig
     from experiments.train_restore.learned.config import LearnedTrainConfig
     from experiments.train_restore.wan.config import WanTrainConfig
 
     return {
         "reconstruct": (ReconstructConfig,),
         "train_restore": (LearnedTrainConfig, WanTrainConfig),
+        "train_depth": (DepthTrainConfig,),
         "build_examples": (ExamplesConfig,),
         "build_dataset": (DatasetConfig,),
     }
