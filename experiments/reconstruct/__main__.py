@@ -14,6 +14,7 @@ import sys
 from experiments.command import CommandParser
 from experiments.config import load_config
 from experiments.reconstruct.config import ReconstructConfig
+from experiments.reconstruct.job import run_job
 from rein3d_jax.errors import InputError
 
 
@@ -30,8 +31,6 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _reconstruct(options: argparse.Namespace) -> None:
-    from experiments.reconstruct.job import run_job  # so that --help and --keys need no stage
-
     run_job(load_config(ReconstructConfig, options.config, _overrides(options)), resume=options.resume)
 
 

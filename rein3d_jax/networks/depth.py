@@ -1,7 +1,7 @@
 """The distance network's weights in a folder of safetensors: a tensor a leaf, named by its path, as float16."""
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import numpy as np
@@ -9,18 +9,9 @@ import numpy as np
 from rein3d_jax.depth.network.config import DepthNetworkConfig
 from rein3d_jax.depth.network.network import initial_depth_parameters
 from rein3d_jax.io.weights.safetensors_folder import load_params, save_params
+from rein3d_jax.restore.wan.names import TensorRow
 
 SHIPPED_DEPTH = Path(__file__).resolve().parents[1] / "depth" / "weights"
-
-
-class _LeafRow(NamedTuple):
-    """A tensor that is a leaf as it stands."""
-
-    leaf: tuple[str, ...]
-    index: None
-    name: str
-    shape: tuple[int, ...]
-    axes: tuple[int, ...]
 
 
 def read_depth_network(folder: str | Path = SHIPPED_DEPTH, config: DepthNetworkConfig = DepthNetworkConfig()) -> dict:
@@ -49,6 +40,6 @@ def _read(folder: str | Path, shapes: dict) -> dict:
     return load_params(folder, _rows(shapes), shapes)
 
 
-def _rows(tree: Any) -> list[_LeafRow]:
+def _rows(tree: Any) -> list[TensorRow]:
     leaves = [(tuple(key.key for key in path), leaf) for path, leaf in jax.tree_util.tree_leaves_with_path(tree)]
-    return [_LeafRow(path, None, ".".join(path), leaf.shape, tuple(range(leaf.ndim))) for path, leaf in leaves]
+    return [TensorRow(path, None, ".".join(path), leaf.shape, tuple(range(leaf.ndim))) for path, leaf in leaves]
