@@ -39,7 +39,7 @@ def network_distance(parameters: dict, rgb: np.ndarray, height: int) -> np.ndarr
 
 def box_distance(rgb: np.ndarray) -> np.ndarray:
     """The fitted box's distance over the camera's height (h, w)."""
-    shell, _ = fit_room_shell(jnp.asarray(rgb), config=RoomShellConfig(camera_height=1.0))
+    shell, _ = fit_room_shell(jnp.asarray(rgb), 1.0, config=RoomShellConfig())
     return np.asarray(shell_distance(shell, *rgb.shape[:2]))
 
 

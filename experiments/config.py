@@ -109,7 +109,8 @@ def _refuse_unknown(cls: type, table: Mapping, prefix: str, known: list[str]) ->
     kinds = get_type_hints(cls)
     for name, value in table.items():
         if name not in kinds:
-            (closest,) = difflib.get_close_matches(prefix + name, known, n=1, cutoff=0.0)
+            moved = [key for key in known if key.rpartition(".")[2] == name]  # to another table
+            (closest,) = difflib.get_close_matches(prefix + name, moved or known, n=1, cutoff=0.0)
             raise InputError(f"{prefix}{name} is not a setting; did you mean {closest}?")
         if dataclasses.is_dataclass(kinds[name]) and isinstance(value, Mapping):
             _refuse_unknown(kinds[name], value, f"{prefix}{name}.", known)

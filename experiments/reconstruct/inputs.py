@@ -4,6 +4,7 @@ import dataclasses
 import hashlib
 from pathlib import Path
 
+from rein3d_jax.conventions import EYE_HEIGHT
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.input_file import require_file
 from rein3d_jax.io.pictures.panorama import read_panorama
@@ -26,11 +27,19 @@ class InputConfig(Settings):
     )
     views: str | None = setting("sample:room/scene.json", "ground-truth views, for measuring only")
     height: int = setting(256, "rows that the job works at, a multiple of 32", within="[64, 4096]")
+    camera_height: float | None = setting(
+        None, f"of the lens above the floor: the scale; none: {EYE_HEIGHT}, a guess", within="(0, inf)", unit="metres"
+    )
 
     def __post_init__(self):
         super().__post_init__()
         if self.height % 32:
             raise InputError(f"height must be a multiple of 32, not {self.height}")
+
+    @property
+    def eye_height(self) -> float:
+        """Metres of the lens above the floor: as given, or a guess."""
+        return EYE_HEIGHT if self.camera_height is None else self.camera_height
 
 
 def resolve(path: str) -> Path:

@@ -76,7 +76,8 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool]:
     config, key = job.config, jax.random.key(job.config.seed)
     network = config.input.distance is None and config.depth.method == "network"
     weights = files_digest(SHIPPED_DEPTH) if network else ""
-    depends = [files, config.input.height, job.settings("depth"), job.settings("shell"), weights, jax.__version__]
+    read = [config.input.height, config.input.eye_height]
+    depends = [files, *read, job.settings("depth"), job.settings("shell"), weights, jax.__version__]
     panorama, estimated = job.stage("read", depends, lambda: _read(config, weights))
     coarse = job.stage("lift", job.settings("lift"), lambda: lift_scene(panorama, config.lift))
     trajectories = job.stage(
@@ -93,7 +94,9 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool]:
 
 def _read(config: ReconstructConfig, weights: str):
     network = read_depth_network() if weights else None
-    panorama, estimated = with_distance(input_panorama(config.input), config, network)
+    panorama, estimated = with_distance(
+        input_panorama(config.input), config, network, camera_height=config.input.eye_height
+    )
     return panorama, np.array([estimated])
 
 

@@ -56,7 +56,8 @@ def _distance_origin(run: Run) -> str:
         "network": "a network that has seen other rooms said how far each pixel is",
     }[run.config.depth.method]
     said = f"{run.distance_origin}. The photograph came without depth, so {how}"
-    return f"{said}, and sizes follow the camera height you set."
+    told = "a guess" if run.config.input.camera_height is None else "as given"
+    return f"{said}, and sizes follow the camera's height above the floor, {run.config.input.eye_height} m ({told})."
 
 
 def _warnings(run: Run, metrics: dict):
@@ -64,10 +65,11 @@ def _warnings(run: Run, metrics: dict):
     if run.estimated:
         if run.config.depth.method == "shell":
             yield "The distance is that of an empty room: furniture will look flat from the side. Give --distance."
-        yield (
-            "The scale is a guess: every length follows the height of the camera above the floor. Measure it and give "
-            "it with --set shell.camera_height."
-        )
+        if run.config.input.camera_height is None:
+            yield (
+                "The scale is a guess: every length follows the height of the camera above the floor, for which "
+                f"{run.config.input.eye_height} m was taken. Measure it and give it with --set input.camera_height."
+            )
     unknown = 1 - float(jnp.mean(run.result.panorama.valid))
     if unknown > 0.001:
         yield f"{unknown:.1%} of the panorama has no known distance (windows, mirrors); it was placed far away."

@@ -1,7 +1,7 @@
 """A panorama's distance: completed where one was given, or that of a fitted room where none was.
 
     complete.complete_distance(distance, valid, *, config)           every pixel finite, known ones untouched
-    room_shell.fit_room_shell(rgb, *, config) -> (RoomShell, info)   from the picture's edges and the camera's height
+    room_shell.fit_room_shell(rgb, camera_height, *, config)         the box by a picture's edges, and how well it fits
     room_shell.shell_distance(shell, height, width) -> distance      exact ray-box distance
     shell_from_distance.shell_from_distance(panorama)                 the box around what a panorama saw
 

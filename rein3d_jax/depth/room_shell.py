@@ -9,7 +9,7 @@ ceiling lines, and its floor lines, hidden by furniture, are weak evidence: so t
 walls, ceiling and floor part the picture's colours (picture_parts) as well, and jaxopt refines on all of it.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import jax
@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import jaxopt
 from flax import struct
 
+from rein3d_jax.conventions import EYE_HEIGHT
 from rein3d_jax.depth.picture_edges import blur, edge_support, edge_tensors
 from rein3d_jax.depth.picture_parts import ROWS, colour_bins, mutual_information
 from rein3d_jax.depth.shell_outline import shell_edges, shell_parts
@@ -39,7 +40,6 @@ _SIZES = 41  # tried for each box, from 1/e to e times its own
 class RoomShellConfig(Settings):
     """The room fit's settings. Ranges only lean on the fit: rooms may be larger or smaller."""
 
-    camera_height: float = setting(1.6, "camera's height above the floor: the scale", within="(0, inf)", unit="metres")
     wall_range: tuple[float, float] = setting((0.6, 5.0), "walls' distances", within="(0, inf)", unit="camera heights")
     ceiling_range: tuple[float, float] = setting(
         (0.375, 1.6), "ceiling's height above the camera", within="(0, inf)", unit="camera heights"
@@ -77,16 +77,17 @@ class _Evidence:
     bins: jax.Array  # (n, k) colour bins
 
 
-def fit_room_shell(rgb: jax.Array, *, config: RoomShellConfig) -> tuple[RoomShell, dict[str, float]]:
-    """The box around the camera of an upright panorama (h, 2h, 3) in sRGB, and how well the picture bears it out:
-    `support`, in [0, 1], the mean edge support along its lines (0.35 to 0.55 in furnished rooms), and `loss`.
+def fit_room_shell(
+    rgb: jax.Array, camera_height: float = EYE_HEIGHT, *, config: RoomShellConfig
+) -> tuple[RoomShell, dict[str, float]]:
+    """The box around the camera of an upright panorama (h, 2h, 3) in sRGB, taken `camera_height` metres above the
+    floor, and how well the picture bears it out: `support`, in [0, 1], the mean edge support along its lines (0.35 to
+    0.55 in furnished rooms), and `loss`. The fit is made in camera heights: another height only multiplies it.
 
     Deterministic for a seed. Raises InputError for a picture without edges."""
     height, width, channels = rgb.shape
     assert width == 2 * height and channels == 3, rgb.shape
     small = jax.image.resize(rgb, (_WORKING_HEIGHT, 2 * _WORKING_HEIGHT, 3), "linear")
-    # The fit is made in camera heights: another height compiles nothing anew.
-    camera_height, config = config.camera_height, replace(config, camera_height=1.0)
     evidence = _evidence(small, config=config)
     if float(jnp.max(evidence.sharp)) < 0.01:  # noise of half a grey level gives more
         raise InputError("the picture shows no edges to fit a room to; give its distance map")

@@ -5,6 +5,7 @@ from collections import deque
 import jax
 from flax import struct
 
+from rein3d_jax.conventions import EYE_HEIGHT
 from rein3d_jax.explore.trajectories import Trajectories
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
 from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene
@@ -41,15 +42,20 @@ class Reconstruction:
 
 
 def reconstruct(
-    panorama: Panorama, key: jax.Array, *, stages: Stages = Stages(), network: TrainedNetwork | None = None
+    panorama: Panorama,
+    key: jax.Array,
+    *,
+    stages: Stages = Stages(),
+    network: TrainedNetwork | None = None,
+    camera_height: float = EYE_HEIGHT,
 ) -> Reconstruction:
     """The scene of a panorama (h, 2 h): lifted, explored, restored and refined (paper Sec. 3).
 
-    Distances that are not `valid` are completed; where none is, an empty box is fitted to the picture (`with_distance`
-    estimates better ones). `network` is the trained restorer, where stages.restore names one. Runs outside jit; every
-    stage in it is compiled. The same key gives the same bytes.
+    Distances that are not `valid` are completed; where none is, an empty box is fitted to the picture, taken
+    `camera_height` metres above the floor (`with_distance` estimates better ones). `network` is the trained restorer,
+    where stages.restore names one. Runs outside jit; every stage in it is compiled. The same key gives the same bytes.
     """
-    panorama, _ = with_distance(panorama, stages)
+    panorama, _ = with_distance(panorama, stages, camera_height=camera_height)
     known = survey(panorama, stages)
     restore = restorer(stages.restore, room_background(panorama, stages.restore), network)
     explore_key, refine_key = (jax.random.fold_in(key, i) for i in range(2))

@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 from flax import struct
 
+from rein3d_jax.conventions import EYE_HEIGHT
 from rein3d_jax.depth.complete import complete_distance
 from rein3d_jax.depth.estimate import estimate_distance
 from rein3d_jax.depth.room_shell import fit_room_shell, shell_distance
@@ -24,20 +25,23 @@ class Survey:
     trajectories: Trajectories  # where a camera may go
 
 
-def with_distance(panorama: Panorama, stages: Stages, network: dict | None = None) -> tuple[Panorama, bool]:
+def with_distance(
+    panorama: Panorama, stages: Stages, network: dict | None = None, *, camera_height: float = EYE_HEIGHT
+) -> tuple[Panorama, bool]:
     """The panorama with a distance everywhere, and whether it was estimated: where none is known, an empty box is
     fitted to the picture's edges, or the depth network (its parameters, `read_depth_network`'s) says it, as
-    stages.depth.method wants; then what is unknown is completed, and `valid` still says what was known."""
+    stages.depth.method wants, for a camera `camera_height` metres above the floor; then what is unknown is completed,
+    and `valid` still says what was known."""
     estimated = not bool(panorama.valid.any())
     if estimated and stages.depth.method == "shell":
-        box, _ = fit_room_shell(panorama.rgb, config=stages.shell)
+        box, _ = fit_room_shell(panorama.rgb, camera_height, config=stages.shell)
         distance = shell_distance(box, *panorama.valid.shape)
         return Panorama(panorama.rgb, distance, jnp.ones(distance.shape, bool)), True
     if estimated:
         if network is None:
             mend = "with_distance(panorama, stages, read_depth_network())"
             raise InputError(f'depth.method "network" needs the trained network: {mend}')
-        panorama = Panorama(panorama.rgb, *estimate_distance(panorama.rgb, network, stages.shell.camera_height))
+        panorama = Panorama(panorama.rgb, *estimate_distance(panorama.rgb, network, camera_height))
     distance = complete_distance(panorama.distance, panorama.valid, config=stages.depth)
     return panorama.replace(distance=distance), estimated
 

@@ -111,6 +111,7 @@ def test_none_is_written_as_a_word(recipe):
         ("refine.stesp=3", "refine.stesp is not a setting; did you mean refine.steps?"),
         ("refnie.steps=3", "refnie is not a setting; did you mean refine?"),
         ("lift.rates.means=3", "lift.rates is not a setting; did you mean refine.rates?"),
+        ("lift.colours=3", "lift.colours is not a setting; did you mean refine.rates.colours?"),  # of the same name
         ("seed=1\nlift.stride=2", r"seed must be a whole number, not '1\nlift.stride=2'"),
         ("lift.stride=0", "lift.stride must be at least 1, not 0"),
         ("refine.steps=-1", "refine.steps must not be negative; -1 is"),

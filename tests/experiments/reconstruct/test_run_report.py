@@ -89,7 +89,7 @@ def test_warnings_in_plain_words(run, changes, words):
 
 def test_a_guessed_scale_is_told(run):
     found = report(dataclasses.replace(run, estimated=True))
-    assert any("scale is a guess" in warning and "shell.camera_height" in warning for warning in found.warnings)
+    assert any("scale is a guess" in warning and "input.camera_height" in warning for warning in found.warnings)
     assert "room-shell estimate" in found.distance_origin
 
 
