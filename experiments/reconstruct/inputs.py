@@ -1,12 +1,15 @@
-"""What a job starts from: the panorama, its distance (given, or fitted), and ground-truth views where there are any."""
+"""What a job starts from: the panorama, its distance where one is given, and ground-truth views where there are any."""
 
 import dataclasses
 import hashlib
 from pathlib import Path
 
+from experiments.reconstruct.given_distance import given_distance, in_metres
 from rein3d_jax.conventions import EYE_HEIGHT
+from rein3d_jax.depth.kinds import DISTANCE_KINDS, METRIC_KINDS
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.input_file import require_file
+from rein3d_jax.io.pictures.image import read_rgb
 from rein3d_jax.io.pictures.panorama import read_panorama
 from rein3d_jax.io.rooms import traced_room
 from rein3d_jax.io.rooms.traced_room import View
@@ -23,12 +26,22 @@ class InputConfig(Settings):
 
     panorama: str = setting("sample:room/input.png", "an equirectangular JPEG, PNG, EXR or HDR, twice as wide as high")
     distance: str | None = setting(
-        "sample:room/input_distance.exr", "metres along each ray: EXR, 16-bit PNG (mm), NPY, NPZ; none: a box is fitted"
+        "sample:room/input_distance.exr", "metres along each ray: EXR, 16-bit PNG (mm), NPY, NPZ; none: it is estimated"
     )
     views: str | None = setting("sample:room/scene.json", "ground-truth views, for measuring only")
     height: int = setting(256, "rows that the job works at, a multiple of 32", within="[64, 4096]")
     camera_height: float | None = setting(
         None, f"of the lens above the floor: the scale; none: {EYE_HEIGHT}, a guess", within="(0, inf)", unit="metres"
+    )
+    distance_kind: str = setting(
+        "distance",
+        "along rays; planar z of cube faces; inverse distance, or distance, up to a factor",
+        among=DISTANCE_KINDS,
+    )
+    scale: str = setting(
+        "metres",
+        "of a given distance: its own, or by the camera's height above its floor; disparity and relative have none",
+        among=("metres", "camera_height"),
     )
 
     def __post_init__(self):
@@ -41,6 +54,11 @@ class InputConfig(Settings):
         """Metres of the lens above the floor: as given, or a guess."""
         return EYE_HEIGHT if self.camera_height is None else self.camera_height
 
+    @property
+    def scaled(self) -> bool:
+        """Whether the camera's height gives a given distance its metres."""
+        return self.scale == "camera_height" or self.distance_kind not in METRIC_KINDS
+
 
 def resolve(path: str) -> Path:
     """The file that a path of the config means."""
@@ -48,11 +66,20 @@ def resolve(path: str) -> Path:
 
 
 def input_panorama(config: InputConfig) -> Panorama:
-    """The panorama at the working height; where no distance is given, none is valid."""
+    """The panorama at the working height, distance in metres along the ray; where none is given, none is valid."""
+    return told_panorama(config)[0]
+
+
+def told_panorama(config: InputConfig) -> tuple[Panorama, str]:
+    """The same, and what was done to a given distance to make it metres along the ray, in words; "" for nothing."""
     path = resolve(config.panorama)
     require_file(path)
-    distance = None if config.distance is None else resolve(config.distance)
-    return read_panorama(path, distance=distance, height=config.height)
+    if config.distance is None:
+        return read_panorama(path, height=config.height), ""
+    given, kind = resolve(config.distance), config.distance_kind
+    panorama, converted = given_distance(read_rgb(path), given, kind, config.height)
+    panorama, scaled = in_metres(panorama, given, config.eye_height if config.scaled else None)
+    return panorama, "; ".join(filter(None, (converted, scaled)))
 
 
 def input_views(config: InputConfig) -> list[View]:

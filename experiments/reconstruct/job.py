@@ -12,7 +12,7 @@ import numpy as np
 from experiments.config import dump_config
 from experiments.reconstruct.budget import OUT_OF_TIME, Clock, within
 from experiments.reconstruct.config import ReconstructConfig
-from experiments.reconstruct.inputs import input_fingerprint, input_panorama, input_views
+from experiments.reconstruct.inputs import input_fingerprint, input_views, told_panorama
 from experiments.reconstruct.outputs import write_outputs
 from experiments.reconstruct.progress import Progress
 from experiments.reconstruct.run import Run
@@ -71,14 +71,15 @@ def _header() -> str:
     return f"# written by rein3d_jax; Python {sys.version.split()[0]}, {versions}; jax on {jax.default_backend()}\n"
 
 
-def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool]:
-    """Everything up to the refined scene, and whether the distance was estimated."""
+def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str]:
+    """Everything up to the refined scene, whether the distance was estimated, and what was done to a given one."""
     config, key = job.config, jax.random.key(job.config.seed)
     network = config.input.distance is None and config.depth.method == "network"
     weights = files_digest(SHIPPED_DEPTH) if network else ""
-    read = [config.input.height, config.input.eye_height]
+    given = config.input
+    read = [given.height, given.eye_height, given.distance_kind, given.scale]
     depends = [files, *read, job.settings("depth"), job.settings("shell"), weights, jax.__version__]
-    panorama, estimated = job.stage("read", depends, lambda: _read(config, weights))
+    panorama, estimated, told = job.stage("read", depends, lambda: _read(config, weights))
     coarse = job.stage("lift", job.settings("lift"), lambda: lift_scene(panorama, config.lift))
     trajectories = job.stage(
         "explore", job.settings("explore"), lambda: radial_trajectories(panorama, config=config.explore)
@@ -89,15 +90,14 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool]:
         "refine", job.settings("refine"), lambda: _refined(job, known, explored, jax.random.fold_in(key, 1))
     )
     why = ALL_PATHS if len(explored) == config.explore.trajectories else OUT_OF_TIME
-    return joined(known, explored, (scene, curves, stopped), why), bool(estimated[0])
+    return joined(known, explored, (scene, curves, stopped), why), bool(estimated[0]), told
 
 
 def _read(config: ReconstructConfig, weights: str):
     network = read_depth_network() if weights else None
-    panorama, estimated = with_distance(
-        input_panorama(config.input), config, network, camera_height=config.input.eye_height
-    )
-    return panorama, np.array([estimated])
+    panorama, told = told_panorama(config.input)
+    panorama, estimated = with_distance(panorama, config, network, camera_height=config.input.eye_height)
+    return panorama, np.array([estimated]), told
 
 
 def _explored(job: _Job, known: Survey, key: jax.Array) -> Iterator[Explored]:

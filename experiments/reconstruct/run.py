@@ -18,6 +18,7 @@ class Run:
     config: ReconstructConfig
     result: Reconstruction
     estimated: bool  # whether the distance was, by stages.depth.method
+    converted: str  # what was done to a given distance, in words; "" = nothing
     views: list[View]  # ground truth
 
     @property

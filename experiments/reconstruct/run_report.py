@@ -50,7 +50,7 @@ def run_report(run: Run, pictures: Pictures, metrics: dict) -> Report:
 
 def _distance_origin(run: Run) -> str:
     if not run.estimated:
-        return "given with the panorama."
+        return "given with the panorama" + (f": {run.converted}." if run.converted else ".")
     how = {
         "shell": "an empty box was fitted to its wall, floor and ceiling edges: furniture is painted onto it",
         "network": "a network that has seen other rooms said how far each pixel is",
@@ -62,14 +62,13 @@ def _distance_origin(run: Run) -> str:
 
 def _warnings(run: Run, metrics: dict):
     trajectories, paths = run.result.trajectories, len(run.result.videos)
-    if run.estimated:
-        if run.config.depth.method == "shell":
-            yield "The distance is that of an empty room: furniture will look flat from the side. Give --distance."
-        if run.config.input.camera_height is None:
-            yield (
-                "The scale is a guess: every length follows the height of the camera above the floor, for which "
-                f"{run.config.input.eye_height} m was taken. Measure it and give it with --set input.camera_height."
-            )
+    if run.estimated and run.config.depth.method == "shell":
+        yield "The distance is that of an empty room: furniture will look flat from the side. Give --distance."
+    if (run.estimated or run.config.input.scaled) and run.config.input.camera_height is None:
+        yield (
+            "The scale is a guess: every length follows the height of the camera above the floor, for which "
+            f"{run.config.input.eye_height} m was taken. Measure it and give it with --set input.camera_height."
+        )
     unknown = 1 - float(jnp.mean(run.result.panorama.valid))
     if unknown > 0.001:
         yield f"{unknown:.1%} of the panorama has no known distance (windows, mirrors); it was placed far away."

@@ -26,7 +26,7 @@ def blank_stages(refine: RefineConfig) -> dict[str, Any]:
     scene, snapshot = _blank(Gaussians, alive=bool), blank_snapshot(refine)
     video, number = _blank(Video), jnp.zeros(0, jnp.int32)
     return {
-        "read": (_blank(Panorama, valid=bool), np.zeros(0, bool)),  # and whether the distance was estimated
+        "read": (_blank(Panorama, valid=bool), np.zeros(0, bool), ""),  # was it estimated; what was done to it
         "lift": scene,
         "explore": _blank(Trajectories, counts=jnp.int32, overflow=jnp.int32),
         "restore": Explored(scene, video, number, jnp.zeros(0), number, number),

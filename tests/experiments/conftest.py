@@ -151,7 +151,7 @@ def run_folder(rooms, tmp_path_factory):
 
     panorama, _ = with_distance(input_panorama(config.input), config)
     coarse, paths = lift_scene(panorama, config.lift), radial_trajectories(panorama, config=config.explore)
-    stage("read", (panorama, np.array([False])))
+    stage("read", (panorama, np.array([False]), ""))
     stage("lift", coarse)
     stage("explore", paths)
     for index, count in enumerate(np.asarray(paths.counts)):

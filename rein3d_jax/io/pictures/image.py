@@ -34,20 +34,27 @@ def read_rgb(path: str | Path, *, panorama: bool = True) -> np.ndarray:
 def resize_panorama(
     rgb: np.ndarray, distance: np.ndarray | None, valid: np.ndarray | None, height: int
 ) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
-    """Picture (h, 2h, 3), distance (h, 2h) and its mask (h, 2h) at `height` rows; None stays None.
+    """Picture (h, 2h, 3), distance (k, 2k) and its mask (k, 2k) at `height` rows; None stays None.
 
     Colour is averaged over each new pixel's area (bilinear, round the seam and over the poles, when the picture
     grows). Distance and validity are picked at the nearest sample: two surfaces never mix.
     """
     assert rgb.shape[1] == 2 * rgb.shape[0], rgb.shape
+    return _resize_colour(rgb, height), *(None if x is None else _picked(x, height) for x in (distance, valid))
+
+
+def _picked(values: np.ndarray, height: int) -> np.ndarray:
+    if height == len(values):
+        return values
+    return values[np.ix_(_nearest(len(values), height), _nearest(2 * len(values), 2 * height))]
+
+
+def _resize_colour(rgb: np.ndarray, height: int) -> np.ndarray:
     if height == len(rgb):
-        return rgb, distance, valid
+        return rgb
     if height < len(rgb):  # areas of a 2:1 grid never reach across the seam
-        colour = cv2.resize(rgb, (2 * height, height), interpolation=cv2.INTER_AREA)
-    else:
-        colour = _enlarge(rgb, height)
-    pick = np.ix_(_nearest(len(rgb), height), _nearest(2 * len(rgb), 2 * height))
-    return colour, *(None if picked is None else picked[pick] for picked in (distance, valid))
+        return cv2.resize(rgb, (2 * height, height), interpolation=cv2.INTER_AREA)
+    return _enlarge(rgb, height)
 
 
 def to_uint8(rgb: np.ndarray) -> np.ndarray:

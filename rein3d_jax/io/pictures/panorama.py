@@ -12,12 +12,11 @@ from rein3d_jax.scene import Panorama
 
 def read_panorama(picture: str | Path, *, distance: str | Path | None = None, height: int | None = None) -> Panorama:
     """The panorama (h, 2 h) in the file `picture`, brought to `height` rows if that is given; without `distance`, a
-    file of metres along each ray, none of its pixels is valid. Raises InputError for whatever `read_rgb` and
-    `read_distance` refuse, another size among it."""
+    file of metres along each ray (of any size; the nearest value is taken), none of its pixels is valid. Raises
+    InputError for whatever `read_rgb` and `read_distance` refuse."""
     rgb = read_rgb(picture)
-    metres, valid = (None, None) if distance is None else read_distance(distance, rgb.shape[:2])
-    if height is not None:
-        rgb, metres, valid = resize_panorama(rgb, metres, valid, height)
+    metres, valid = (None, None) if distance is None else read_distance(distance)
+    rgb, metres, valid = resize_panorama(rgb, metres, valid, len(rgb) if height is None else height)
     if metres is None:
         metres, valid = np.zeros(rgb.shape[:2], np.float32), np.zeros(rgb.shape[:2], bool)
     return Panorama(*map(jnp.asarray, (rgb, metres, valid)))

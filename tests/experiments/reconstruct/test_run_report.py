@@ -46,7 +46,7 @@ def run(run_folder):
     scenes = (found.coarse, found.trajectories, tuple(found.videos()), found.refined)
     result = Reconstruction(found.panorama, *scenes, curves, decisions)
     view = View(HOSTILE, PICTURE, pinhole_camera(upright(np.array([0.5, 0, 0])), 32, 1.5))
-    return Run(dataclasses.replace(found.config, input=named), result, False, [view])
+    return Run(dataclasses.replace(found.config, input=named), result, False, "", [view])
 
 
 def report(run, **changes):

@@ -104,7 +104,8 @@ def test_planar_z_is_never_taken_silently(tmp_path, name):
     write_exr(tmp_path / "x.exr", {name: DISTANCE})
     np.savez(tmp_path / "x.npz", **{name: DISTANCE})
     for path in (tmp_path / "x.exr", tmp_path / "x.npz"):
-        refused(path, "says planar z, not distance: convert")
+        refused(path, "says planar z, not distance: set input.distance_kind = z")
+        np.testing.assert_array_equal(read_distance(path, metres=False)[0], DISTANCE)  # taken as it was said
 
 
 def test_planar_z_beside_other_channels(tmp_path):
@@ -121,6 +122,9 @@ def test_wrong_size_names_both(tmp_path):
     np.save(tmp_path / "x.npy", DISTANCE)
     for path in (tmp_path / "x.exr", tmp_path / "x.npy"):
         refused(path, "16 x 32 values .* panorama 256 x 512", shape=(256, 512))
+        np.testing.assert_array_equal(read_distance(path)[0], DISTANCE)  # any size of 2:1
+    np.save(tmp_path / "square.npy", DISTANCE[:, :16])
+    refused(tmp_path / "square.npy", "16 x 16 values .* twice as many columns as rows", shape=None)
 
 
 def test_wrong_kinds(tmp_path):

@@ -1,0 +1,62 @@
+"""A distance map from a file as metres along the ray: read, converted by what its numbers are, scaled by the camera's
+height where they have no unit. Whatever was done is told, and a map that no room has is refused."""
+
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+
+from rein3d_jax.depth.kinds import along_ray
+from rein3d_jax.depth.plausible import flattest_kind, implausible_size
+from rein3d_jax.depth.scale import height_above_floor
+from rein3d_jax.errors import InputError
+from rein3d_jax.io.pictures.distance import read_distance
+from rein3d_jax.io.pictures.image import resize_panorama
+from rein3d_jax.scene import Panorama
+
+_MEANS = {
+    "z": "planar z of six cube faces",
+    "disparity": "inverse distance, up to a factor",
+    "relative": "distance up to a factor",
+}
+
+
+def given_distance(rgb: np.ndarray, path: Path, kind: str, height: int) -> tuple[Panorama, str]:
+    """The panorama at `height` rows of a picture (h, 2 h, 3) and a file of numbers of a `kind`, distances along rays
+    (up to a factor, unless the kind is metric), and what was done to it, in words. Raises InputError for what
+    `read_distance` refuses, and for a map of the kind "distance" with the surfaces of another."""
+    values, valid = read_distance(path, metres=kind == "distance")
+    told = []
+    if len(values) != len(rgb):
+        sizes = (f"{2 * len(x)}x{len(x)}" for x in (values, rgb))
+        told.append("the map is {}, the picture {}: each pixel took the nearest value".format(*sizes))
+    panorama = Panorama(*map(jnp.asarray, resize_panorama(rgb, values, valid, height)))
+    if kind == "distance":
+        found = flattest_kind(panorama, ("distance", "z", "disparity"))
+        if found != kind:
+            raise InputError(
+                f"{path} is no distance along the ray: its surfaces are flat if it is {_MEANS[found]}; "
+                f"set input.distance_kind = {found}"
+            )
+    else:
+        told.append(f"taken for {_MEANS[kind]}")
+    return along_ray(panorama, kind), "; ".join(told)
+
+
+def in_metres(panorama: Panorama, path: Path, camera_height: float | None) -> tuple[Panorama, str]:
+    """The panorama of `given_distance`, level by now, in metres: multiplied so that its floor lies `camera_height`
+    metres below the camera, or as it is for None; and what was done, in words. Raises InputError for a map without a
+    floor to scale by, and for a room of a size that none has."""
+    told, factor = "", 1.0
+    if camera_height is not None:
+        try:
+            factor = camera_height / height_above_floor(panorama)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
+        panorama = panorama.replace(distance=panorama.distance * factor)
+        told = f"multiplied by {factor:.4g}, so that the floor lies {camera_height} m below the camera"
+    if wrong := implausible_size(panorama):
+        other = "divide it by its units in a metre, or set input.distance_kind = relative and input.camera_height"
+        mend = other if camera_height is None else "check input.camera_height, in metres"
+        raise InputError(f"{path} has {wrong}; {mend}")
+    return panorama, told
