@@ -1,0 +1,87 @@
+"""The distance of a panorama that has none, as a file.
+
+    python -m experiments.estimate_distance --input pano.jpg --output distance.exr [--json FILE] [--set KEY=VALUE ...]
+
+Writes metres along each ray at the picture's own size (one float32 channel, Y; 0 where unknown), and a picture of it
+beside it, distance_colours.png. The keys are those of reconstruct, of which input, depth and shell count; with
+input.distance, that map is written as metres along the ray, converted and scaled as reconstruct would take it.
+"""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from experiments.command import CommandParser
+from experiments.config import load_config
+from experiments.reconstruct.config import ReconstructConfig
+from experiments.reconstruct.inputs import resolve, told_panorama
+from rein3d_jax.errors import InputError
+from rein3d_jax.io.files.atomic import write_text
+from rein3d_jax.io.pictures.distance import write_distance_exr
+from rein3d_jax.io.pictures.image import panorama_rows, resize_distance, write_rgb
+from rein3d_jax.networks.depth import read_depth_network
+from rein3d_jax.pipeline.survey import with_distance
+from rein3d_jax.report.colour_map import colour_map, colour_range
+from rein3d_jax.scene import Panorama
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Exit code 0, or 2 with one line on stderr where the input is at fault."""
+    parser = CommandParser("estimate_distance", __doc__)
+    parser.add_argument("--input", metavar="FILE", required=True, help="an equirectangular JPEG, PNG, EXR or HDR (2:1)")
+    parser.add_argument("--output", metavar="FILE", required=True, help="the distance to write, ending in .exr")
+    parser.add_argument("--json", metavar="FILE", help="where to write seconds, scale and what is unknown")
+    parser.add_recipe(ReconstructConfig, default="quick")
+    return parser.run(_estimate, arguments)
+
+
+def _estimate(options: argparse.Namespace) -> None:
+    begun, output = time.perf_counter(), Path(options.output)
+    if output.suffix.lower() != ".exr":
+        raise InputError(f"--output {output}: the distance is written as EXR; let its name end in .exr")
+    if output.resolve() == Path(options.input).resolve():
+        raise InputError(f"--output {output} is the picture itself: choose another name")
+    given = [f"input.panorama={json.dumps(options.input)}", "input.distance=none", "input.views=none"]
+    config = load_config(ReconstructConfig, options.config, given + options.set)
+    rows = panorama_rows(resolve(config.input.panorama))  # a picture that is none is refused before the long part
+    panorama, told = told_panorama(config.input)
+    placed, estimated = _with_distance(panorama, config)
+    distance = resize_distance(np.where(placed.valid, placed.distance, np.float32(0)), rows)
+    write_distance_exr(output, distance)
+    known = distance > 0
+    write_rgb(
+        output.with_name(f"{output.stem}_colours.png"), colour_map(distance, known, *colour_range(distance, known))
+    )
+    facts = {
+        "distance": str(output),
+        "size": [2 * rows, rows],
+        "worked_at": [2 * config.input.height, config.input.height],
+        "method": config.depth.method if estimated else "given",
+        "converted": told,
+        "camera_height": config.input.eye_height,
+        "camera_height_given": config.input.camera_height is not None,
+        "unknown": round(float(np.mean(distance == 0)), 4),
+        "seconds": round(time.perf_counter() - begun, 3),
+    }
+    if options.json:
+        write_text(options.json, json.dumps(facts, indent=2) + "\n")
+    print(_line(facts))
+
+
+def _with_distance(panorama: Panorama, config: ReconstructConfig) -> tuple[Panorama, bool]:
+    wanted = config.input.distance is None and config.depth.method == "network"
+    network = read_depth_network() if wanted else None
+    return with_distance(panorama, config, network, camera_height=config.input.eye_height)
+
+
+def _line(facts: dict) -> str:
+    height = f"{facts['camera_height']} m" + ("" if facts["camera_height_given"] else ", a guess: input.camera_height")
+    return f"{facts['distance']}: {facts['method']}, camera at {height}, {facts['seconds']} s"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
