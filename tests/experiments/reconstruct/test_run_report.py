@@ -14,6 +14,7 @@ from experiments.reconstruct.run import Pictures, Run
 from experiments.reconstruct.run_report import longest, run_report
 from experiments.reconstruct.sources import sources
 from experiments.run_folder import open_run
+from rein3d_jax.depth.level import unasked_lean
 from rein3d_jax.geometry.poses import pinhole_camera, upright
 from rein3d_jax.io.rooms.traced_room import View
 from rein3d_jax.pipeline.reconstruct import ALL_PATHS, Decisions, Reconstruction
@@ -46,7 +47,7 @@ def run(run_folder):
     scenes = (found.coarse, found.trajectories, tuple(found.videos()), found.refined)
     result = Reconstruction(found.panorama, *scenes, curves, decisions)
     view = View(HOSTILE, PICTURE, pinhole_camera(upright(np.array([0.5, 0, 0])), 32, 1.5))
-    return Run(dataclasses.replace(found.config, input=named), result, False, "", [view])
+    return Run(dataclasses.replace(found.config, input=named), result, False, "", [view], unasked_lean())
 
 
 def report(run, **changes):
@@ -91,6 +92,18 @@ def test_a_guessed_scale_is_told(run):
     found = report(dataclasses.replace(run, estimated=True))
     assert any("scale is a guess" in warning and "input.camera_height" in warning for warning in found.warnings)
     assert "room-shell estimate" in found.distance_origin
+
+
+def test_what_was_done_to_a_given_map_is_told(run):
+    assert report(run).distance_origin == "given with the panorama."
+    relative = dataclasses.replace(run.config.input, distance_kind="relative")
+    scaled = dataclasses.replace(
+        run, converted="multiplied by 2", config=dataclasses.replace(run.config, input=relative)
+    )
+    assert report(scaled).distance_origin == "given with the panorama: multiplied by 2."
+    assert any("scale is a guess" in warning for warning in report(scaled).warnings)
+    measured = dataclasses.replace(relative, camera_height=1.5)
+    assert not report(dataclasses.replace(scaled, config=dataclasses.replace(run.config, input=measured))).warnings
 
 
 def test_a_run_stands_among_what_was_measured(run):
