@@ -19,6 +19,7 @@ from experiments.command import CommandParser
 from experiments.config import load_config
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.inputs import resolve, told_panorama
+from rein3d_jax.depth.level import leaning_again
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.pictures.distance import write_distance_exr
@@ -48,8 +49,9 @@ def _estimate(options: argparse.Namespace) -> None:
     given = [f"input.panorama={json.dumps(options.input)}", "input.distance=none", "input.views=none"]
     config = load_config(ReconstructConfig, options.config, given + options.set)
     rows = panorama_rows(resolve(config.input.panorama))  # a picture that is none is refused before the long part
-    panorama, told = told_panorama(config.input)
+    panorama, told, lean = told_panorama(config.input)
     placed, estimated = _with_distance(panorama, config)
+    placed = leaning_again(placed, lean)
     distance = resize_distance(np.where(placed.valid, placed.distance, np.float32(0)), rows)
     write_distance_exr(output, distance)
     known = distance > 0
@@ -62,6 +64,7 @@ def _estimate(options: argparse.Namespace) -> None:
         "worked_at": [2 * config.input.height, config.input.height],
         "method": config.depth.method if estimated else "given",
         "converted": told,
+        "lean": lean.sentence,
         "camera_height": config.input.eye_height,
         "camera_height_given": config.input.camera_height is not None,
         "unknown": round(float(np.mean(distance == 0)), 4),

@@ -81,7 +81,8 @@ def _refined(room: EvaluationRoom, output: Path) -> tuple[Gaussians, float]:
     config: ReconstructConfig = dataclasses.replace(
         room.config,
         output=str(output),
-        input=InputConfig(**files, views=None, height=room.config.input.height),
+        # The truth is in the picture's own frame, and it stands level.
+        input=InputConfig(**files, views=None, height=room.config.input.height, level=False),
         film=FilmConfig(width=16, height=16, step=10.0, yaw_step=3.0),  # nobody watches it
     )
     metrics = run_job(config, resume=True)

@@ -4,10 +4,14 @@ import dataclasses
 import hashlib
 from pathlib import Path
 
+import jax.numpy as jnp
+
 from experiments.reconstruct.given_distance import given_distance, in_metres
 from rein3d_jax.conventions import EYE_HEIGHT
 from rein3d_jax.depth.kinds import DISTANCE_KINDS, METRIC_KINDS
+from rein3d_jax.depth.level import Lean, estimate_lean, levelled, unasked_lean
 from rein3d_jax.errors import InputError
+from rein3d_jax.geometry.poses import rigid
 from rein3d_jax.io.files.input_file import require_file
 from rein3d_jax.io.pictures.image import read_rgb
 from rein3d_jax.io.pictures.panorama import read_panorama
@@ -30,6 +34,7 @@ class InputConfig(Settings):
     )
     views: str | None = setting("sample:room/scene.json", "ground-truth views, for measuring only")
     height: int = setting(256, "rows that the job works at, a multiple of 32", within="[64, 4096]")
+    level: bool = setting(True, "a picture that leans is levelled before all else; false: it is taken as level")
     camera_height: float | None = setting(
         None, f"of the lens above the floor: the scale; none: {EYE_HEIGHT}, a guess", within="(0, inf)", unit="metres"
     )
@@ -66,25 +71,42 @@ def resolve(path: str) -> Path:
 
 
 def input_panorama(config: InputConfig) -> Panorama:
-    """The panorama at the working height, distance in metres along the ray; where none is given, none is valid."""
+    """The panorama at the working height, level, distance in metres along the ray; where none is given, none is
+    valid."""
     return told_panorama(config)[0]
 
 
-def told_panorama(config: InputConfig) -> tuple[Panorama, str]:
-    """The same, and what was done to a given distance to make it metres along the ray, in words; "" for nothing."""
+def told_panorama(config: InputConfig) -> tuple[Panorama, str, Lean]:
+    """The same; what was done to a given distance to make it metres along the ray, in words, "" for nothing; and how
+    the picture leaned."""
     path = resolve(config.panorama)
     require_file(path)
     if config.distance is None:
-        return read_panorama(path, height=config.height), ""
+        panorama, lean = _levelled(read_panorama(path, height=config.height), config)
+        return panorama, "", lean
     given, kind = resolve(config.distance), config.distance_kind
     panorama, converted = given_distance(read_rgb(path), given, kind, config.height)
+    panorama, lean = _levelled(panorama, config)  # a floor is looked for below
     panorama, scaled = in_metres(panorama, given, config.eye_height if config.scaled else None)
-    return panorama, "; ".join(filter(None, (converted, scaled)))
+    return panorama, "; ".join(filter(None, (converted, scaled))), lean
+
+
+def _levelled(panorama: Panorama, config: InputConfig) -> tuple[Panorama, Lean]:
+    lean = estimate_lean(panorama.rgb) if config.level else unasked_lean()
+    return levelled(panorama, lean), lean
 
 
 def input_views(config: InputConfig) -> list[View]:
     """The views that a scene.json lists; [] where the config names none."""
     return [] if config.views is None else list(traced_room.read_posed_views(resolve(config.views), anywhere=True))
+
+
+def levelled_views(views: list[View], lean: Lean) -> list[View]:
+    """The views in the world of the panorama that `lean` levelled."""
+    turn = rigid(lean.level_from_picture, jnp.zeros(3))
+    poses = [jnp.matmul(turn, view.camera.world_from_camera, precision="highest") for view in views]
+    cameras = [view.camera.replace(world_from_camera=pose) for view, pose in zip(views, poses, strict=True)]
+    return [dataclasses.replace(view, camera=camera) for view, camera in zip(views, cameras, strict=True)]
 
 
 def input_fingerprint(config: InputConfig) -> str:

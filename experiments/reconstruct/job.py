@@ -12,11 +12,12 @@ import numpy as np
 from experiments.config import dump_config
 from experiments.reconstruct.budget import OUT_OF_TIME, Clock, within
 from experiments.reconstruct.config import ReconstructConfig
-from experiments.reconstruct.inputs import input_fingerprint, input_views, told_panorama
+from experiments.reconstruct.inputs import input_fingerprint, input_views, levelled_views, told_panorama
 from experiments.reconstruct.outputs import write_outputs
 from experiments.reconstruct.progress import Progress
 from experiments.reconstruct.run import Run
 from experiments.reconstruct.stage_store import StageStore
+from rein3d_jax.depth.level import Lean
 from rein3d_jax.explore.trajectories import radial_trajectories
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.networks.depth import SHIPPED_DEPTH, read_depth_network
@@ -61,7 +62,8 @@ def run_job(config: ReconstructConfig, *, resume: bool = False) -> dict:
     with Progress(config) as progress:
         store = StageStore(output / "stages", config.refine, resume=resume)
         job = _Job(config, store, progress, clock)
-        metrics = write_outputs(Run(config, *_stages(job, files), views), store, clock)
+        *made, lean = _stages(job, files)
+        metrics = write_outputs(Run(config, *made, levelled_views(views, lean), lean), store, clock)
         progress.finish(output, metrics)
     return metrics
 
@@ -71,15 +73,16 @@ def _header() -> str:
     return f"# written by rein3d_jax; Python {sys.version.split()[0]}, {versions}; jax on {jax.default_backend()}\n"
 
 
-def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str]:
-    """Everything up to the refined scene, whether the distance was estimated, and what was done to a given one."""
+def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str, Lean]:
+    """Everything up to the refined scene; whether the distance was estimated, what was done to a given one, and how the
+    picture leaned."""
     config, key = job.config, jax.random.key(job.config.seed)
     network = config.input.distance is None and config.depth.method == "network"
     weights = files_digest(SHIPPED_DEPTH) if network else ""
     given = config.input
-    read = [given.height, given.eye_height, given.distance_kind, given.scale]
+    read = [given.height, given.level, given.eye_height, given.distance_kind, given.scale]
     depends = [files, *read, job.settings("depth"), job.settings("shell"), weights, jax.__version__]
-    panorama, estimated, told = job.stage("read", depends, lambda: _read(config, weights))
+    panorama, estimated, told, lean = job.stage("read", depends, lambda: _read(config, weights))
     coarse = job.stage("lift", job.settings("lift"), lambda: lift_scene(panorama, config.lift))
     trajectories = job.stage(
         "explore", job.settings("explore"), lambda: radial_trajectories(panorama, config=config.explore)
@@ -90,14 +93,14 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str]:
         "refine", job.settings("refine"), lambda: _refined(job, known, explored, jax.random.fold_in(key, 1))
     )
     why = ALL_PATHS if len(explored) == config.explore.trajectories else OUT_OF_TIME
-    return joined(known, explored, (scene, curves, stopped), why), bool(estimated[0]), told
+    return joined(known, explored, (scene, curves, stopped), why), bool(estimated[0]), told, lean
 
 
 def _read(config: ReconstructConfig, weights: str):
     network = read_depth_network() if weights else None
-    panorama, told = told_panorama(config.input)
+    panorama, told, lean = told_panorama(config.input)
     panorama, estimated = with_distance(panorama, config, network, camera_height=config.input.eye_height)
-    return panorama, np.array([estimated]), told
+    return panorama, np.array([estimated]), told, lean
 
 
 def _explored(job: _Job, known: Survey, key: jax.Array) -> Iterator[Explored]:

@@ -44,6 +44,7 @@ def write_outputs(run: Run, store: StageStore, clock: Clock) -> dict:
         **run_metrics.trouble(result),
         **run_metrics.choices(result, store, config.explore),
         "distance": run.distance_origin,
+        "lean": run_metrics.lean(run.lean),
         "recipe": recipe_digest(output / "config.toml"),
         "coverage": {"coarse": round(seen, 4), "refined": round(covered, 4)},
     }

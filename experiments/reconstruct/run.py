@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from experiments.reconstruct.config import ReconstructConfig
+from rein3d_jax.depth.level import Lean
 from rein3d_jax.io.rooms.traced_room import View
 from rein3d_jax.pipeline.reconstruct import Reconstruction
 
@@ -19,7 +20,8 @@ class Run:
     result: Reconstruction
     estimated: bool  # whether the distance was, by stages.depth.method
     converted: str  # what was done to a given distance, in words; "" = nothing
-    views: list[View]  # ground truth
+    views: list[View]  # ground truth, in the levelled panorama's world
+    lean: Lean  # of the picture as it came
 
     @property
     def distance_origin(self) -> str:

@@ -4,6 +4,7 @@ import resource
 from pathlib import Path
 
 from experiments.reconstruct.stage_store import StageStore
+from rein3d_jax.depth.level import Lean
 from rein3d_jax.explore.profile import ExploreConfig
 from rein3d_jax.pipeline.reconstruct import Reconstruction
 
@@ -30,6 +31,12 @@ def choices(result: Reconstruction, store: StageStore, explore: ExploreConfig) -
     found = [{"step": int(step), "held_out_psnr": round(float(psnr), 3)} for step, psnr in result.curves.psnr]
     stopped = {"explore": result.decisions.explored, "refine": result.decisions.refined}
     return {"paths": paths, "evaluations": found, "stopped": stopped}
+
+
+def lean(found: Lean) -> dict:
+    """How the picture leaned, in degrees, and what was done about it."""
+    numbers = {name: round(float(getattr(found, name)), 3) for name in ("degrees", "roll", "pitch", "confidence")}
+    return {"verdict": found.verdict, **numbers, "told": found.sentence}
 
 
 def trouble(result: Reconstruction) -> dict:

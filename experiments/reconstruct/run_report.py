@@ -103,8 +103,9 @@ def _parts(run: Run, pictures: Pictures):
     panorama = run.result.panorama
     near, far = colour_range(panorama.distance, panorama.valid)
     depth = colour_map(panorama.distance, panorama.valid, near, far)
-    yield Section("What went in", "The panorama, and how far each pixel is.", (_jpeg("panorama", panorama.rgb),
-                  _jpeg("distance", depth)), scale=(float(near), float(far)), wide=True)  # fmt: skip
+    caption = f"The panorama, and how far each pixel is. {run.lean.sentence}"
+    pictures_in = (_jpeg("panorama", panorama.rgb), _jpeg("distance", depth))
+    yield Section("What went in", caption, pictures_in, scale=(float(near), float(far)), wide=True)
     for order, index in enumerate(longest(run.result.trajectories)):
         yield _path(run.result, index, pictures.coarse_ends[order], pictures.refined_ends[order])
     for index in _shown_views(run.views, pictures.refined_views):

@@ -11,6 +11,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from rein3d_jax.depth.level import Lean
 from rein3d_jax.errors import InputError
 from rein3d_jax.explore.trajectories import Trajectories
 from rein3d_jax.io.files.checkpoint import load, save
@@ -26,7 +27,8 @@ def blank_stages(refine: RefineConfig) -> dict[str, Any]:
     scene, snapshot = _blank(Gaussians, alive=bool), blank_snapshot(refine)
     video, number = _blank(Video), jnp.zeros(0, jnp.int32)
     return {
-        "read": (_blank(Panorama, valid=bool), np.zeros(0, bool), ""),  # was it estimated; what was done to it
+        # whether its distance was estimated, what was done to a given one, how it leaned
+        "read": (_blank(Panorama, valid=bool), np.zeros(0, bool), "", _blank(Lean)),
         "lift": scene,
         "explore": _blank(Trajectories, counts=jnp.int32, overflow=jnp.int32),
         "restore": Explored(scene, video, number, jnp.zeros(0), number, number),

@@ -3,6 +3,7 @@
     complete.complete_distance(distance, valid, *, config)           every pixel finite, known ones untouched
     room_shell.fit_room_shell(rgb, camera_height, *, config)         the box by a picture's edges, and how well it fits
     room_shell.shell_distance(shell, height, width) -> distance      exact ray-box distance
+    level.estimate_lean(rgb) -> Lean                                 from the picture's edges; levelled(panorama, lean)
     shell_from_distance.shell_from_distance(panorama)                 the box around what a panorama saw
 
 Distances are metres along the ray. An estimate never becomes "known" here: validity is a mask the caller keeps.

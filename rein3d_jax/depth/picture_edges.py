@@ -10,7 +10,7 @@ import math
 import jax
 import jax.numpy as jnp
 
-from rein3d_jax.geometry.resample import sample_sphere
+from rein3d_jax.geometry.resample import pad_sphere, sample_sphere
 from rein3d_jax.geometry.sphere import latitudes, pixels_from_rays
 
 # Luminance and two opponent chroma channels; chroma counts double, since shadows and lamps hardly move it.
@@ -38,10 +38,22 @@ def tangent_gradients(image: jax.Array) -> tuple[jax.Array, jax.Array]:
     return east / jnp.cos(latitudes(image.shape[0]))[:, None, None], north
 
 
-def edge_tensors(rgb: jax.Array, *, noise: float, texture: float) -> jax.Array:
+def sharp_gradients(image: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Those of `tangent_gradients` by five taps: a difference of two neighbours tilts an edge towards the diagonal, by
+    2 degrees at 15 from upright, where its blur is a pixel; this one by a quarter of that."""
+    padded = pad_sphere(image, 2)
+    high, wide = image.shape[:2]
+    columns = [padded[2:-2, 2 + k : 2 + k + wide] for k in (-2, -1, 1, 2)]
+    rows = [padded[2 + k : 2 + k + high, 2:-2] for k in (2, 1, -1, -2)]
+    east, north = ((8 * (c - b) - (d - a)) / 12 for a, b, c, d in (columns, rows))
+    return east / jnp.cos(latitudes(high))[:, None, None], north
+
+
+def edge_tensors(rgb: jax.Array, *, noise: float, texture: float, gradients=tangent_gradients) -> jax.Array:
     """Saturated structure tensors (h, w, 3) of a picture (h, w, 3) sRGB. `noise` is the step per pixel that counts as
-    half an edge on flat ground, `texture` how many times its surroundings' mean energy an edge must have."""
-    east, north = tangent_gradients(blur(rgb @ jnp.array(OPPONENT).T, 1.0))
+    half an edge on flat ground, `texture` how many times its surroundings' mean energy an edge must have; `gradients`
+    is `tangent_gradients` or `sharp_gradients`, where directions must be exact."""
+    east, north = gradients(blur(rgb @ jnp.array(OPPONENT).T, 1.0))
     tensor = jnp.stack([east * east, east * north, north * north], axis=-1).sum(axis=-2)
     energy = (tensor[..., 0] + tensor[..., 2])[..., None]
     surroundings = blur(energy, rgb.shape[0] / 24)

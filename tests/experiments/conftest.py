@@ -132,6 +132,7 @@ def run_folder(rooms, tmp_path_factory):
     from experiments.config import config_from, dump_config
     from experiments.reconstruct.config import ReconstructConfig
     from experiments.reconstruct.inputs import input_panorama
+    from rein3d_jax.depth.level import unasked_lean
     from rein3d_jax.explore.trajectories import radial_trajectories
     from rein3d_jax.geometry.sphere import rays_of_pose as rays_at
     from rein3d_jax.io.files.checkpoint import save
@@ -142,7 +143,8 @@ def run_folder(rooms, tmp_path_factory):
 
     folder, room = tmp_path_factory.mktemp("run") / "room", rooms / "room2"
     files = {"panorama": str(room / "input.png"), "distance": str(room / "input_distance.exr"), "views": "none"}
-    table = {"output": str(folder), "input": {**files, "height": 64}, "explore": {"trajectories": 2, "step": 0.4}}
+    given = {**files, "height": 64, "level": False}
+    table = {"output": str(folder), "input": given, "explore": {"trajectories": 2, "step": 0.4}}
     config = config_from(ReconstructConfig, table)
 
     def stage(name, result):
@@ -151,7 +153,7 @@ def run_folder(rooms, tmp_path_factory):
 
     panorama, _ = with_distance(input_panorama(config.input), config)
     coarse, paths = lift_scene(panorama, config.lift), radial_trajectories(panorama, config=config.explore)
-    stage("read", (panorama, np.array([False]), ""))
+    stage("read", (panorama, np.array([False]), "", unasked_lean()))
     stage("lift", coarse)
     stage("explore", paths)
     for index, count in enumerate(np.asarray(paths.counts)):

@@ -7,7 +7,7 @@ import pytest
 
 from rein3d_jax.geometry.pinhole import pinhole_rays
 from rein3d_jax.geometry.poses import pinhole_camera, rigid, upright
-from rein3d_jax.geometry.resample import pad_sphere, perspective_crop, sample_sphere
+from rein3d_jax.geometry.resample import pad_sphere, perspective_crop, sample_sphere, sample_sphere_cubic
 from rein3d_jax.geometry.rotations import matrix_from_quats
 from rein3d_jax.geometry.sphere import pixel_rays, pixels_from_rays, world_from_camera_axes
 
@@ -24,6 +24,18 @@ def sky(rays: jax.Array) -> jax.Array:
 def test_pixel_centres_come_back() -> None:
     u, v = jnp.meshgrid(jnp.arange(WIDTH) + 0.5, jnp.arange(HEIGHT) + 0.5)
     np.testing.assert_allclose(sample_sphere(IMAGE, u, v), IMAGE, atol=1e-6)  # one float32 lerp
+
+
+def test_cubics_keep_pixels_and_parabolas_and_cross_the_seam() -> None:
+    u, v = jnp.meshgrid(jnp.arange(WIDTH) + 0.5, jnp.arange(HEIGHT) + 0.5)
+    np.testing.assert_allclose(sample_sphere_cubic(IMAGE, u, v), IMAGE, atol=1e-6)  # one float32 lerp
+    inside = jnp.linspace(3, HEIGHT - 3, 20)  # two pixels from a pole
+    parabola = (jnp.arange(HEIGHT) + 0.5)[:, None, None] ** 2 * jnp.ones((1, WIDTH, 1))
+    found = sample_sphere_cubic(parabola, jnp.full(20, 5.3), inside)[:, 0]
+    np.testing.assert_allclose(found, inside**2, rtol=1e-5)  # float32 sums of 16 terms
+    v = jnp.linspace(0, HEIGHT, 20)
+    left, right = (sample_sphere_cubic(IMAGE, jnp.full(20, u), v) for u in (0.0, WIDTH))
+    np.testing.assert_allclose(left, right, atol=1e-5)
 
 
 def test_padding_is_the_picture_seen_past_its_edges() -> None:
