@@ -35,6 +35,7 @@ class Panorama:
     rgb: jax.Array  # (h, w, 3) sRGB in [0, 1]
     distance: jax.Array  # (h, w) metres, finite everywhere; meaningless where not valid
     valid: jax.Array  # (h, w) bool, distance is known
+    doubt: jax.Array | None = None  # (h, w) mean relative error expected of an estimated distance; None: it was given
 
 
 @struct.dataclass

@@ -1,6 +1,6 @@
 """A chart of the automatic choice beside the grid it stands for: PSNR against seconds, a point a row of studies.scene.
 
-    python -m benchmarks.studies.choice_chart [benchmarks/results/scene_choice.json] [--png FILE]
+python -m benchmarks.studies.choice_chart [benchmarks/results/scene_choice.json] [--png FILE]
 """
 
 import io

@@ -1,14 +1,19 @@
-"""Distance of a panorama that comes without one: by the trained network, in metres by the camera's height."""
+"""Distance of a panorama that comes without one, in metres by the camera's height: by the trained network, the shell
+that the picture's lines bear out near the network's room, and the picture's own edges."""
 
 from dataclasses import dataclass
 from functools import partial
 
 import jax
 import jax.numpy as jnp
+from flax import struct
 
 from rein3d_jax.depth.complete import CompleteConfig
+from rein3d_jax.depth.furnished import furnished_room, room_seen
 from rein3d_jax.depth.network.config import DepthNetworkConfig
 from rein3d_jax.depth.network.network import estimate_depth
+from rein3d_jax.depth.room_shell import RoomShellConfig, shell_distance
+from rein3d_jax.depth.shell_near import fit_shell_near
 from rein3d_jax.settings import setting
 
 _ROWS = 128  # what the shipped network was trained at; at 256 its first weights were off by a third more
@@ -19,17 +24,43 @@ class DepthConfig(CompleteConfig):
     """Distance where none is given, and where it is not known."""
 
     method: str = setting(
-        "shell", "of a picture without distance: an empty box, or the trained network", among=("shell", "network")
+        "network", "of a picture without distance: by the trained network, or an empty box", among=("network", "shell")
     )
 
 
-@partial(jax.jit, static_argnames=("config",))
+@struct.dataclass
+class Estimate:
+    """What is believed of a panorama's distances."""
+
+    distance: jax.Array  # (h, 2 h) metres along each ray
+    known: jax.Array  # (h, 2 h) bool, there is a distance: not the sky, not what is outside
+    doubt: jax.Array  # (h, 2 h) mean relative error expected
+    support: jax.Array  # () share of walls and ceiling on which network and shell agree
+
+
+@partial(jax.jit, static_argnames=("config", "shell"))
 def estimate_distance(
-    rgb: jax.Array, parameters: dict, camera_height: float, *, config: DepthNetworkConfig = DepthNetworkConfig()
-) -> tuple[jax.Array, jax.Array]:
-    """Metres along each ray and where there are any, both (h, 2 h), of a level panorama (h, 2 h, 3), sRGB in [0, 1],
-    taken `camera_height` metres above the floor; `parameters` are those of the network, which sees _ROWS rows."""
+    rgb: jax.Array,
+    parameters: dict,
+    camera_height: float,
+    *,
+    config: DepthNetworkConfig = DepthNetworkConfig(),
+    shell: RoomShellConfig = RoomShellConfig(),
+) -> Estimate:
+    """The Estimate of a level panorama (h, 2 h, 3), sRGB in [0, 1], taken `camera_height` metres above the floor;
+    `parameters` are those of the network, which sees _ROWS rows."""
     found = estimate_depth(parameters, jax.image.resize(rgb, (_ROWS, 2 * _ROWS, 3), "linear")[None], config)
     size = rgb.shape[:2]
-    distance = camera_height * jnp.exp(jax.image.resize(found.log_distance[0], size, "linear"))
-    return distance, jax.image.resize(found.unknown[0], size, "linear") < 0
+
+    def at_size(x):
+        return jax.image.resize(x[0], size, "linear")
+
+    distance, background = jnp.exp(at_size(found.log_distance)), jnp.exp(at_size(found.log_background))
+    box = fit_shell_near(rgb, background, room_seen(distance, background), config=shell)
+    room = furnished_room(rgb, distance, background, shell_distance(box, *size))
+    return Estimate(
+        distance=camera_height * room.distance,
+        known=at_size(found.unknown) < 0,
+        doubt=jnp.exp(at_size(found.log_scale)),
+        support=room.support,
+    )

@@ -9,27 +9,28 @@ ceiling lines, and its floor lines, hidden by furniture, are weak evidence: so t
 walls, ceiling and floor part the picture's colours (picture_parts) as well, and jaxopt refines on all of it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
 import jax
 import jax.numpy as jnp
 import jaxopt
-from flax import struct
 
 from rein3d_jax.conventions import EYE_HEIGHT
-from rein3d_jax.depth.picture_edges import blur, edge_support, edge_tensors
-from rein3d_jax.depth.picture_parts import ROWS, colour_bins, mutual_information
-from rein3d_jax.depth.shell_outline import shell_edges, shell_parts
+from rein3d_jax.depth.shell_evidence import (
+    Evidence,
+    coarse_support,
+    colour_information,
+    fine_support,
+    picture_evidence,
+    shell_of,
+)
 from rein3d_jax.errors import InputError
-from rein3d_jax.geometry.safe import safe_norm
 from rein3d_jax.geometry.shell import RoomShell, meet_shell
 from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.settings import Settings, setting
 
-_WORKING_HEIGHT = 256  # pixels; the noise and blur scales are tied to it
-_WIDE, _SHARP = (1.0, 3.0), (0.7, 2.0)  # pixels of blur: to find the basin, and to end in it
-_COARSE, _FINE = 12, 32  # points along each line: to rank boxes, and to refine one
 _STEPS = 0.7, 0.02  # log metres; how far the first and the last round of climbing reach
 _YAW_STEP = 0.35  # radians for one log metre
 _CHANGED = 0.4  # share of a child's parts that differ from its parent's
@@ -68,15 +69,6 @@ class RoomShellConfig(Settings):
             raise InputError("edge_weights must not all be 0")
 
 
-@struct.dataclass
-class _Evidence:
-    """All that is read off the picture."""
-
-    wide: jax.Array  # (h, w, 3) edge tensors
-    sharp: jax.Array  # (h, w, 3) edge tensors
-    bins: jax.Array  # (n, k) colour bins
-
-
 def fit_room_shell(
     rgb: jax.Array, camera_height: float = EYE_HEIGHT, *, config: RoomShellConfig
 ) -> tuple[RoomShell, dict[str, float]]:
@@ -87,47 +79,17 @@ def fit_room_shell(
     Deterministic for a seed. Raises InputError for a picture without edges."""
     height, width, channels = rgb.shape
     assert width == 2 * height and channels == 3, rgb.shape
-    small = jax.image.resize(rgb, (_WORKING_HEIGHT, 2 * _WORKING_HEIGHT, 3), "linear")
-    evidence = _evidence(small, config=config)
+    evidence = picture_evidence(rgb, noise=config.noise, texture=config.texture)
     if float(jnp.max(evidence.sharp)) < 0.01:  # noise of half a grey level gives more
         raise InputError("the picture shows no edges to fit a room to; give its distance map")
     ends = [_refine(box, evidence, config) for box in _search(evidence, config=config)]
     box, loss, support = min(ends, key=lambda end: end[1])
-    return _shell_from(box, camera_height), {"support": support, "loss": loss}
+    return shell_of(box, camera_height), {"support": support, "loss": loss}
 
 
 def shell_distance(shell: RoomShell, height: int, width: int) -> jax.Array:
     """The distance (height, width) in metres along each pixel's ray to the inside of the box, exact."""
     return meet_shell(shell, jnp.zeros(3), pixel_rays(height, width))[0]
-
-
-def _shell_from(params: jax.Array, camera_height: float) -> RoomShell:
-    """The box of (6,) numbers: yaw, then logs of four walls and the ceiling in camera heights; yaw within 45
-    degrees."""
-    quarters = jnp.round(params[0] / (jnp.pi / 2))
-    walls = jnp.roll(jnp.exp(params[1:5]), quarters.astype(jnp.int32))
-    height = jnp.asarray(camera_height, params.dtype)
-    return RoomShell(params[0] - quarters * jnp.pi / 2, walls * height, height, jnp.exp(params[5]) * height)
-
-
-@partial(jax.jit, static_argnames=("config",))
-def _evidence(rgb: jax.Array, config: RoomShellConfig) -> _Evidence:
-    tensors = edge_tensors(rgb, noise=config.noise, texture=config.texture)
-    wide, sharp = (sum(blur(tensors, sigma) for sigma in sigmas) / len(sigmas) for sigmas in (_WIDE, _SHARP))
-    return _Evidence(wide, sharp, colour_bins(rgb))
-
-
-def _support(shell: RoomShell, tensors: jax.Array, points: int, edge_weights: tuple[float, float, float]) -> jax.Array:
-    """Mean edge support along the twelve lines, weighted by the angle each piece spans -> () in [0, 1]."""
-    starts, ends = shell_edges(shell)
-    along = ((jnp.arange(points) + 0.5) / points)[:, None]
-    places = starts[:, None] + along * (ends - starts)[:, None]  # (12, points, 3)
-    normals = jnp.cross(starts, ends)
-    area = safe_norm(normals, keepdims=True)
-    # d(angle)/d(along) = |start x end| / |place|^2
-    weights = area / jnp.sum(places * places, axis=-1) * jnp.repeat(jnp.array(edge_weights), 4)[:, None]
-    support = edge_support(tensors, places, (normals / area)[:, None])
-    return jnp.sum(weights * support) / jnp.sum(weights)
 
 
 def _outside(x: jax.Array, low: jax.Array, high: jax.Array) -> jax.Array:
@@ -142,18 +104,16 @@ def _unlikely(box: jax.Array, config: RoomShellConfig) -> jax.Array:
     return walls + _outside(box[5], *jnp.log(jnp.array(config.ceiling_range))) + _outside(aspect, -limit, limit)
 
 
-def _edge_loss(box: jax.Array, evidence: _Evidence, config: RoomShellConfig) -> jax.Array:
+def _edge_loss(box: jax.Array, evidence: Evidence, config: RoomShellConfig) -> jax.Array:
     """What ranks boxes during the climb."""
-    support = _support(_shell_from(box, 1.0), evidence.wide, _COARSE, config.edge_weights)
-    return 1 - support + config.prior * _unlikely(box, config)
+    return 1 - coarse_support(box, evidence, config.edge_weights) + config.prior * _unlikely(box, config)
 
 
-def _loss(box: jax.Array, evidence: _Evidence, config: RoomShellConfig) -> tuple[jax.Array, jax.Array]:
+def _loss(box: jax.Array, evidence: Evidence, config: RoomShellConfig) -> tuple[jax.Array, jax.Array]:
     """What is minimised in the end, and the edge support in it."""
-    shell = _shell_from(box, 1.0)
-    support = _support(shell, evidence.sharp, _FINE, config.edge_weights)
-    information = mutual_information(shell_parts(shell, ROWS, 2 * ROWS).reshape(-1, 3), evidence.bins)
-    return 1 - support - config.colour_weight * information + config.prior * _unlikely(box, config), support
+    support = fine_support(box, evidence, config.edge_weights)
+    informed = config.colour_weight * colour_information(box, evidence)
+    return 1 - support - informed + config.prior * _unlikely(box, config), support
 
 
 def _random_boxes(key: jax.Array, config: RoomShellConfig) -> jax.Array:
@@ -163,33 +123,32 @@ def _random_boxes(key: jax.Array, config: RoomShellConfig) -> jax.Array:
     return jax.random.uniform(key, (config.climbers, 6), minval=low, maxval=high)
 
 
-def _climb(boxes: jax.Array, key: jax.Array, step: jax.Array, evidence: _Evidence, config: RoomShellConfig):
-    """Boxes (n, 6), each the best of itself and of its children, and their losses (n,). A child differs in
-    some of its parts, so that one wrong wall can be mended alone; its lengths tend to change together."""
+def climb(boxes: jax.Array, key: jax.Array, step: jax.Array, loss: Callable, children: int):
+    """Boxes (n, 6), each the best of itself and of its children by `loss` of a box, and their losses (n,). A child
+    differs in some of its parts, so that one wrong wall can be mended alone; its lengths tend to change together."""
     parts, whole, chosen = jax.random.split(key, 3)
-    noise = jax.random.normal(parts, (config.children, *boxes.shape)).at[..., 0].multiply(_YAW_STEP)
-    noise = noise.at[..., 1:].add(jax.random.normal(whole, (config.children, len(boxes), 1)))
+    noise = jax.random.normal(parts, (children, *boxes.shape)).at[..., 0].multiply(_YAW_STEP)
+    noise = noise.at[..., 1:].add(jax.random.normal(whole, (children, len(boxes), 1)))
     noise *= jax.random.bernoulli(chosen, _CHANGED, noise.shape)
     family = jnp.concatenate([boxes[None], boxes + step * noise])
     # In batches that stay within a few MB.
-    losses = jax.lax.map(lambda box: _edge_loss(box, evidence, config), family.reshape(-1, 6), batch_size=512)
-    losses = losses.reshape(-1, len(boxes))
+    losses = jax.lax.map(loss, family.reshape(-1, 6), batch_size=512).reshape(-1, len(boxes))
     return family[jnp.argmin(losses, axis=0), jnp.arange(len(boxes))], jnp.min(losses, axis=0)
 
 
-def _best_size(box: jax.Array, evidence: _Evidence, config: RoomShellConfig) -> jax.Array:
+def _best_size(box: jax.Array, evidence: Evidence, config: RoomShellConfig) -> jax.Array:
     sizes = box + jnp.linspace(-1, 1, _SIZES)[:, None] * jnp.array([0.0, 1, 1, 1, 1, 1])
     return sizes[jnp.argmin(jax.vmap(lambda box: _loss(box, evidence, config)[0])(sizes))]
 
 
 @partial(jax.jit, static_argnames=("config",))
-def _search(evidence: _Evidence, config: RoomShellConfig) -> jax.Array:
+def _search(evidence: Evidence, config: RoomShellConfig) -> jax.Array:
     """The finalists (finalists, 6): the best of many boxes that climbed from random starts, each in its best size."""
     key, start = jax.random.split(jax.random.key(config.seed))
     steps = _STEPS[0] * (_STEPS[1] / _STEPS[0]) ** jnp.linspace(0, 1, config.rounds)
     rounds = (jax.random.split(key, config.rounds), steps)
-    boxes = _random_boxes(start, config)
-    boxes, losses = jax.lax.scan(lambda boxes, x: _climb(boxes, *x, evidence, config), boxes, rounds)
+    boxes, loss = _random_boxes(start, config), partial(_edge_loss, evidence=evidence, config=config)
+    boxes, losses = jax.lax.scan(lambda boxes, x: climb(boxes, *x, loss, config.children), boxes, rounds)
     boxes = boxes[jnp.argsort(losses[-1])[: config.finalists]]
     return jax.lax.map(lambda box: _best_size(box, evidence, config), boxes)
 
@@ -197,7 +156,7 @@ def _search(evidence: _Evidence, config: RoomShellConfig) -> jax.Array:
 _loss_and_slope = jax.jit(jax.value_and_grad(_loss, has_aux=True), static_argnames=("config",))
 
 
-def _refine(box: jax.Array, evidence: _Evidence, config: RoomShellConfig) -> tuple[jax.Array, float, float]:
+def _refine(box: jax.Array, evidence: Evidence, config: RoomShellConfig) -> tuple[jax.Array, float, float]:
     """The nearest local optimum, its loss and support, by L-BFGS-B: SciPy's through jaxopt, since jaxopt's own
     LBFGS takes 15 CPU seconds to compile here and this one 4."""
 

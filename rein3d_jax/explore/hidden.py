@@ -11,17 +11,31 @@ from rein3d_jax.geometry.sphere import pixels_from_rays
 from rein3d_jax.scene import Panorama
 
 _STEPS = 24  # places tried along a ray, 6 % apart; even, so that the guess itself is one of them
+_DOUBTFUL = 0.2  # relative error expected of a distance above which what was lifted there may be wrong
 _MARGIN = 0.02  # relative: what lies this little in front of a surface lies on it
 
 
 def relative_distance(panorama: Panorama, points: jax.Array) -> jax.Array:
     """The distance of points (..., 3), world, over that of the surface which `panorama` (at the world's origin) shows
     in their direction: (...), below 1 where space was seen to be empty, above 1 where it is hidden."""
-    height, width = panorama.distance.shape
+    return jnp.linalg.norm(points, axis=-1) / jnp.maximum(_in_direction(panorama.distance, points), 1e-6)
+
+
+def _in_direction(image: jax.Array, points: jax.Array) -> jax.Array:
+    """The pixel (...) of a panorama's image (h, w) that shows points (..., 3)."""
+    height, width = image.shape
     u, v = pixels_from_rays(points, height, width)
     column = jnp.clip(jnp.floor(u).astype(jnp.int32), 0, width - 1)
     row = jnp.clip(jnp.floor(v).astype(jnp.int32), 0, height - 1)
-    return jnp.linalg.norm(points, axis=-1) / jnp.maximum(panorama.distance[row, column], 1e-6)
+    return image[row, column]
+
+
+@jax.jit
+def in_doubt(panorama: Panorama, points: jax.Array) -> jax.Array:
+    """Whether the distance that `panorama` shows in the direction of points (..., 3) is doubtful: (...) bool."""
+    if panorama.doubt is None:
+        return jnp.zeros(points.shape[:-1], bool)
+    return _in_direction(panorama.doubt, points) > _DOUBTFUL
 
 
 @jax.jit

@@ -49,9 +49,11 @@ def _radial_trajectories(panorama: Panorama, *, config: ExploreConfig = ExploreC
     """The tau paths { k step v | k step <= l }, v = (cos phi, -sin phi, 0), that see the most (Algorithm 1, whole),
     longest first.
 
-    `panorama` (h, w) stands at the origin, not rotated. Where the origin has no room the path is the origin alone.
+    `panorama` (h, w) stands at the origin, not rotated; where its distance is in doubt, paths keep as far away as it
+    may be wrong. Where the origin has no room the path is the origin alone.
     """
-    raw = band_profile(panorama.distance, panorama.valid, config=config)
+    nearest = panorama.distance if panorama.doubt is None else panorama.distance * jnp.maximum(1 - panorama.doubt, 0.0)
+    raw = band_profile(nearest, panorama.valid, config=config)
     rotation = _best_rotation(raw, config)
     directions = _fan(rotation, config.trajectories)
     free = travel(safe_distances(raw, directions, config=config), config=config)

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from rein3d_jax.explore.hidden import on_observed
+from rein3d_jax.explore.hidden import in_doubt, on_observed
 from rein3d_jax.lift import compact, with_capacity
 from rein3d_jax.parallel import data_mesh
 from rein3d_jax.pipeline.devices import steps_over
@@ -49,7 +49,8 @@ def refine_scene(
     config, raster = stages.refine, stages.rasterize
     if isinstance(start, Gaussians):
         scene = _within_limits(start, views, stages)
-        fixed = on_observed(panorama, scene.means) if config.freeze_observed else None
+        sure = on_observed(panorama, scene.means) & ~in_doubt(panorama, scene.means)
+        fixed = sure if config.freeze_observed else None
         extent = scene_extent(panorama)
         start = first_snapshot(scene, views, extent=extent, config=config, raster=raster, fixed=fixed)
     chosen = take_step if config.devices == 1 else steps_over(data_mesh(config.devices))

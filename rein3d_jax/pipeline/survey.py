@@ -36,14 +36,16 @@ def with_distance(
     if estimated and stages.depth.method == "shell":
         box, _ = fit_room_shell(panorama.rgb, camera_height, config=stages.shell)
         distance = shell_distance(box, *panorama.valid.shape)
-        return Panorama(panorama.rgb, distance, jnp.ones(distance.shape, bool)), True
+        return Panorama(panorama.rgb, distance, jnp.ones(distance.shape, bool), jnp.zeros(distance.shape)), True
     if estimated:
         if network is None:
             mend = "with_distance(panorama, stages, read_depth_network())"
             raise InputError(f'depth.method "network" needs the trained network: {mend}')
-        panorama = Panorama(panorama.rgb, *estimate_distance(panorama.rgb, network, camera_height))
+        found = estimate_distance(panorama.rgb, network, camera_height, shell=stages.shell)
+        panorama = Panorama(panorama.rgb, found.distance, found.known, found.doubt)
     distance = complete_distance(panorama.distance, panorama.valid, config=stages.depth)
-    return panorama.replace(distance=distance), estimated
+    doubt = jnp.zeros(distance.shape) if panorama.doubt is None else panorama.doubt
+    return panorama.replace(distance=distance, doubt=doubt), estimated
 
 
 def survey(panorama: Panorama, stages: Stages) -> Survey:

@@ -1,17 +1,17 @@
 """The front door: Gaussians + camera -> Frame, differentiable in the Gaussians and in the camera's pose.
 
-    import jax.numpy as jnp
-    from rein3d_jax.geometry.poses import equirectangular_camera, upright
-    from rein3d_jax.rasterize import RasterizeConfig, allocate, rasterize
-    from rein3d_jax.scene import Gaussians
+import jax.numpy as jnp
+from rein3d_jax.geometry.poses import equirectangular_camera, upright
+from rein3d_jax.rasterize import RasterizeConfig, allocate, rasterize
+from rein3d_jax.scene import Gaussians
 
-    scene = Gaussians(jnp.array([[2.0, 0, 0]]), jnp.full((1, 3), -2.0), jnp.array([[1.0, 0, 0, 0]]),
-                      jnp.array([3.0]), jnp.ones((1, 1, 3)), jnp.array([True]))
-    camera = equirectangular_camera(upright(jnp.zeros(3)), height=64)
-    config = RasterizeConfig()
-    buffers = allocate(scene, [camera], config=config)                # outside jit: measures them
-    frame = rasterize(scene, camera, config=config, buffers=buffers)  # jit, grad, vmap over cameras
-    assert frame.rgb.shape == (64, 128, 3) and frame.overflow == 0
+scene = Gaussians(jnp.array([[2.0, 0, 0]]), jnp.full((1, 3), -2.0), jnp.array([[1.0, 0, 0, 0]]),
+                  jnp.array([3.0]), jnp.ones((1, 1, 3)), jnp.array([True]))
+camera = equirectangular_camera(upright(jnp.zeros(3)), height=64)
+config = RasterizeConfig()
+buffers = allocate(scene, [camera], config=config)                # outside jit: measures them
+frame = rasterize(scene, camera, config=config, buffers=buffers)  # jit, grad, vmap over cameras
+assert frame.rgb.shape == (64, 128, 3) and frame.overflow == 0
 """
 
 import math

@@ -18,4 +18,3 @@ def photometric_loss(image: jax.Array, target: jax.Array, weight: jax.Array, *, 
     inner = weight[rim:-rim, rim:-rim]
     dissimilar = jnp.mean(inner * jnp.mean(1 - ssim_map(image, known), axis=-1))
     return (1 - ssim_weight) * absolute + ssim_weight * dissimilar
-

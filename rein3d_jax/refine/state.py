@@ -34,6 +34,4 @@ def initial_state(gaussians: Gaussians, config: RefineConfig, *, extent: float, 
     fixed = jnp.zeros_like(gaussians.alive) if fixed is None else fixed & gaussians.alive
     optimizer = make_optimizer(config).init(parameters)
     step = jnp.zeros((), jnp.int32)
-    return RefineState(
-        parameters, gaussians.alive, floor, fixed, jnp.float32(extent), optimizer, step, zeros, zeros
-    )
+    return RefineState(parameters, gaussians.alive, floor, fixed, jnp.float32(extent), optimizer, step, zeros, zeros)

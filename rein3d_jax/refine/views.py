@@ -17,6 +17,7 @@ from rein3d_jax.scene import Camera
 # Yaw (to the right) and pitch (up) of the six views, in quarters of a circle.
 _FACES = ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (0, -1))
 
+
 @struct.dataclass
 class Views:
     """m square pinhole views."""

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from rein3d_jax.explore.hidden import _MARGIN, _STEPS, hidden_distance, on_observed
+from rein3d_jax.explore.hidden import _MARGIN, _STEPS, hidden_distance, in_doubt, on_observed
 from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.scene import Panorama
 
@@ -66,3 +66,12 @@ def test_never_in_front_of_what_was_seen() -> None:
     assert in_front.sum() <= 1
     assert (moved > 0).mean() > 0.5
     assert np.all(moved <= 2.0001 * np.asarray(guess))
+
+
+def test_what_is_in_doubt_is_told_by_direction() -> None:
+    """The right half of the picture is doubtful."""
+    doubt = jnp.where(jnp.arange(WIDTH) >= WIDTH // 2, 0.5, 0.0)
+    panorama = seen_at(1.0).replace(doubt=jnp.broadcast_to(doubt, SHAPE))
+    points = 3.0 * jnp.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])  # to the left, to the right
+    np.testing.assert_array_equal(in_doubt(panorama, points), [False, True])
+    assert not in_doubt(panorama.replace(doubt=None), points).any()

@@ -149,3 +149,12 @@ def test_no_path_is_longer_than_the_longest_allowed_and_a_far_limit_changes_noth
 def test_bad_settings_are_refused_by_name(bad: dict) -> None:
     with pytest.raises(InputError, match=next(iter(bad))):
         ExploreConfig(**bad)
+
+
+def test_a_doubtful_distance_counts_as_so_much_shorter() -> None:
+    profile = random_profile(3)
+    doubtful = panorama(profile).replace(doubt=jnp.full((HEIGHT, WIDTH), 0.25))
+    shorter = radial_trajectories(panorama(0.75 * profile), config=CONFIG)
+    np.testing.assert_allclose(
+        radial_trajectories(doubtful, config=CONFIG).positions, shorter.positions, atol=1e-5
+    )  # float32, metres up to 6

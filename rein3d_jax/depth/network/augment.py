@@ -13,6 +13,8 @@ from rein3d_jax.geometry.sphere import latitudes, pixel_rays, pixels_from_rays
 from rein3d_jax.settings import Settings, setting
 
 _SHARE = "[0, 1]"
+_LENS_LIGHT = 0.06  # standard deviation of the log of sRGB between two lenses, halved
+_RIM_LIGHT = 0.3  # greatest log of sRGB by which a lens is darker at its rim
 
 
 @dataclass(frozen=True)
@@ -29,11 +31,12 @@ class DepthAugmentConfig(Settings):
     noise: float = setting(0.03, "greatest standard deviation of noise, sRGB", within=_SHARE)
     blurred: float = setting(0.4, "share that is blurred", within=_SHARE)
     tripod: float = setting(0.15, "share with a disc at the nadir", within=_SHARE)
+    lenses: float = setting(0.3, "share stitched of two lenses that saw other light", within=_SHARE)
 
 
 def augment_depth(key: jax.Array, example: DepthExample, config: DepthAugmentConfig) -> DepthExample:
     """One example (h, w) changed at random."""
-    warp, which, yaw, flip, tone, disc = jax.random.split(key, 6)
+    warp, which, yaw, flip, tone, disc, lenses = jax.random.split(key, 7)
     example = jax.lax.cond(
         jax.random.bernoulli(which, config.warped), lambda x: _warped(warp, x, config), lambda x: x, example
     )
@@ -41,7 +44,8 @@ def augment_depth(key: jax.Array, example: DepthExample, config: DepthAugmentCon
     mirror = jax.random.bernoulli(flip)
     example = jax.tree.map(lambda x: jnp.roll(x, columns, axis=1), example)
     example = jax.tree.map(lambda x: jnp.where(mirror, jnp.flip(x, axis=1), x), example)
-    return example.replace(rgb=_with_tripod(disc, toned(tone, example.rgb, config), config))
+    rgb = _of_two_lenses(lenses, toned(tone, example.rgb, config), config)
+    return example.replace(rgb=_with_tripod(disc, rgb, config))
 
 
 def _warped(key: jax.Array, example: DepthExample, config: DepthAugmentConfig) -> DepthExample:
@@ -88,6 +92,21 @@ def _blurred(rgb: jax.Array) -> jax.Array:
     rgb = (jnp.roll(rgb, 1, 1) + 2 * rgb + jnp.roll(rgb, -1, 1)) / 4
     padded = jnp.concatenate([rgb[:1], rgb, rgb[-1:]])
     return (padded[:-2] + 2 * rgb + padded[2:]) / 4
+
+
+def _of_two_lenses(key: jax.Array, rgb: jax.Array, config: DepthAugmentConfig) -> jax.Array:
+    """Two half spheres, of some: each darker towards its rim, one brighter than the other, and a seam between them."""
+    there, turn, light, rim, width = jax.random.split(key, 5)
+    along = pixel_rays(*rgb.shape[:2]) @ _heading(2 * jnp.pi * jax.random.uniform(turn))  # 1 and -1: the lenses' axes
+    softness = jnp.deg2rad(jax.random.uniform(width, minval=0.5, maxval=8.0))
+    side = jnp.tanh(along / softness) * _LENS_LIGHT * jax.random.normal(light)
+    darker = _RIM_LIGHT * jax.random.uniform(rim) * (1 - jnp.abs(along)) ** 2
+    changed = jnp.clip(rgb * jnp.exp(side - darker)[..., None], 0.0, 1.0)
+    return jnp.where(jax.random.bernoulli(there, config.lenses), changed, rgb)
+
+
+def _heading(azimuth: jax.Array) -> jax.Array:
+    return jnp.array([jnp.cos(azimuth), jnp.sin(azimuth), 0.0])
 
 
 def _with_tripod(key: jax.Array, rgb: jax.Array, config: DepthAugmentConfig) -> jax.Array:

@@ -15,6 +15,7 @@ from rein3d_jax.depth.network.backbone import Backbone
 from rein3d_jax.depth.network.config import COARSEST, DepthNetworkConfig
 from rein3d_jax.depth.network.convolution import GridBlock
 from rein3d_jax.depth.network.horizon import Horizon, background_inverse, to_columns
+from rein3d_jax.depth.network.second_look import SecondLook
 from rein3d_jax.geometry.pyramid import double
 from rein3d_jax.geometry.sphere import latitudes
 
@@ -42,6 +43,9 @@ class DepthNetwork(nn.Module):
         assert width == 2 * height and channels == 3 and height % COARSEST == 0, rgb.shape
         features = Backbone(self.config, self.frozen, name="backbone")(rgb)
         columns, planes = Horizon(self.config, name="horizon")(features[1:])
+        look = SecondLook(self.config, name="look")
+        for _ in range(self.config.looks):
+            planes = look([rgb, *features[:2]], columns, planes)
         dense = Decoder(self.config, name="decoder")(features, columns, planes)
         fine = to_columns(planes, width)
         log_background = -jnp.log(background_inverse(fine[..., 0], fine[..., 1], height))
