@@ -3,8 +3,10 @@
     python -m experiments.estimate_distance --input pano.jpg --output distance.exr [--json FILE] [--set KEY=VALUE ...]
 
 Writes metres along each ray at the picture's own size (one float32 channel, Y; 0 where unknown), and a picture of it
-beside it, distance_colours.png. The keys are those of reconstruct, of which input, depth and shell count; with
-input.distance, that map is written as metres along the ray, converted and scaled as reconstruct would take it.
+beside it, distance_colours.png. Where the picture leaned, the distance is the levelled picture's, which is written too,
+distance_level.png; input.level = false keeps it as it came. The keys are those of reconstruct, of which input, depth
+and shell count; with input.distance, that map is written as metres along the ray, converted and scaled as reconstruct
+would take it.
 """
 
 import argparse
@@ -19,11 +21,12 @@ from experiments.command import CommandParser
 from experiments.config import load_config
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.inputs import resolve, told_panorama
-from rein3d_jax.depth.level import leaning_again
+from rein3d_jax.depth.level import LEANED, levelled
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.pictures.distance import write_distance_exr
 from rein3d_jax.io.pictures.image import panorama_rows, resize_distance, write_rgb
+from rein3d_jax.io.pictures.panorama import read_panorama
 from rein3d_jax.networks.depth import read_depth_network
 from rein3d_jax.pipeline.survey import with_distance
 from rein3d_jax.report.colour_map import colour_map, colour_range
@@ -51,13 +54,15 @@ def _estimate(options: argparse.Namespace) -> None:
     rows = panorama_rows(resolve(config.input.panorama))  # a picture that is none is refused before the long part
     panorama, told, lean = told_panorama(config.input)
     placed, estimated = _with_distance(panorama, config)
-    placed = leaning_again(placed, lean)
     distance = resize_distance(np.where(placed.valid, placed.distance, np.float32(0)), rows)
     write_distance_exr(output, distance)
     known = distance > 0
     write_rgb(
         output.with_name(f"{output.stem}_colours.png"), colour_map(distance, known, *colour_range(distance, known))
     )
+    if lean.verdict == LEANED:
+        picture = levelled(read_panorama(resolve(config.input.panorama)), lean).rgb
+        write_rgb(output.with_name(f"{output.stem}_level.png"), np.asarray(picture))
     facts = {
         "distance": str(output),
         "size": [2 * rows, rows],

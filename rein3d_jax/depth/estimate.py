@@ -16,6 +16,7 @@ from rein3d_jax.depth.room_shell import RoomShellConfig, shell_distance
 from rein3d_jax.depth.shell_near import fit_shell_near
 from rein3d_jax.settings import setting
 
+_TURNS = 8  # of a picture: the network's coarsest features are an eighth of a circle wide
 _ROWS = 128  # what the shipped network was trained at; at 256 its first weights were off by a third more
 
 
@@ -48,7 +49,24 @@ def estimate_distance(
     shell: RoomShellConfig = RoomShellConfig(),
 ) -> Estimate:
     """The Estimate of a level panorama (h, 2 h, 3), sRGB in [0, 1], taken `camera_height` metres above the floor;
-    `parameters` are those of the network, which sees _ROWS rows."""
+    `parameters` are those of the network, which sees _ROWS rows. A picture that is turned by eighths of a circle gets
+    the same distances, turned."""
+    turn = _brightest_turn(rgb)
+    estimate = _estimate(jnp.roll(rgb, -turn, axis=1), parameters, camera_height, config, shell)
+    turned_back = {name: jnp.roll(getattr(estimate, name), turn, axis=1) for name in ("distance", "known", "doubt")}
+    return estimate.replace(**turned_back)
+
+
+def _brightest_turn(rgb: jax.Array) -> jax.Array:
+    """Columns by which the brightest eighth of a picture is away from its start: a heading that is the room's own, so
+    that neither the network's grid nor the shell's search depends on where the camera happened to face."""
+    eighths = rgb.mean((0, 2)).reshape(_TURNS, -1).mean(1)
+    return jnp.argmax(eighths) * (rgb.shape[1] // _TURNS)
+
+
+def _estimate(
+    rgb: jax.Array, parameters: dict, camera_height: float, config: DepthNetworkConfig, shell: RoomShellConfig
+) -> Estimate:
     found = estimate_depth(parameters, jax.image.resize(rgb, (_ROWS, 2 * _ROWS, 3), "linear")[None], config)
     size = rgb.shape[:2]
 

@@ -103,11 +103,6 @@ def levelled(panorama: Panorama, lean: Lean) -> Panorama:
     return level_panorama(panorama, lean.level_from_picture) if lean.verdict == LEANED else panorama
 
 
-def leaning_again(panorama: Panorama, lean: Lean) -> Panorama:
-    """What is known of the levelled panorama, in the pixels of the picture as it was."""
-    return level_panorama(panorama, lean.level_from_picture.T) if lean.verdict == LEANED else panorama
-
-
 @jax.jit
 def level_panorama(panorama: Panorama, rotation: jax.Array) -> Panorama:
     """The panorama (h, 2 h) rotated: what it shows along r is shown along `rotation` (3, 3) r. Colours are interpolated
