@@ -1,4 +1,5 @@
-"""Estimated distance against rooms with truth: the network beside the fitted box, AbsRel and the share within 1.25.
+"""Estimated distance against rooms with truth: what reconstruct takes, the network alone, the fitted box; AbsRel, the
+share within 1.25, and how far walls and floor are from flat.
 
     python -m benchmarks.depth ROOMS [--weights FOLDER] [--rendered FOLDER] [--height 128] [--box] [--pictures FOLDER]
 
@@ -7,6 +8,7 @@ ROOMS holds folders with input.png and input_distance.exr; every tenth room of a
 """
 
 import argparse
+import json
 import sys
 import time
 from pathlib import Path
@@ -19,13 +21,24 @@ from experiments.train_depth.data import as_floats
 from experiments.train_depth.held_out import estimated_distance
 from experiments.train_depth.rendered import RenderedRooms
 from rein3d_jax.conventions import EYE_HEIGHT
+from rein3d_jax.depth.estimate import estimate_distance
 from rein3d_jax.depth.network.config import DepthNetworkConfig
 from rein3d_jax.depth.room_shell import RoomShellConfig, fit_room_shell, shell_distance
+from rein3d_jax.depth.shell_from_distance import shell_from_distance
 from rein3d_jax.evaluate.distance_error import distance_errors
+from rein3d_jax.evaluate.standard_error import over_rooms
 from rein3d_jax.geometry.pyramid import double
+from rein3d_jax.geometry.shell import meet_shell
+from rein3d_jax.geometry.sphere import pixel_rays, pixel_solid_angles
+from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.pictures.distance import read_distance
 from rein3d_jax.io.pictures.image import read_rgb, resize_panorama, write_rgb
 from rein3d_jax.networks.depth import SHIPPED_DEPTH, read_depth_network
+from rein3d_jax.scene import Panorama
+
+FIGURES = "abs_rel", "within", "abs_rel_scaled", "within_scaled", "off_planes", "off_best_planes", "seconds"
+_ON_PLANE = 0.02  # relative distance of the truth from its room's box
+_CEILING = 4  # among RoomShell's faces
 
 
 def network_distance(parameters: dict, rgb: np.ndarray, height: int) -> np.ndarray:
@@ -67,41 +80,76 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--height", type=int, default=128, help="rows at which the network sees a picture")
     parser.add_argument("--box", action="store_true", help="the fitted box too, which takes some seconds a picture")
     parser.add_argument("--pictures", type=Path, help="folder for the picture, its true and its estimated distances")
+    parser.add_argument("--json", type=Path, help="file for the figures of each room")
     return parser.run(_measure, arguments)
 
 
 def _measure(options: argparse.Namespace) -> None:
     parameters = read_depth_network(options.weights)
-    methods = {"network": lambda rgb: network_distance(parameters, rgb, options.height)}
+    methods = {
+        "estimate": lambda rgb: np.asarray(estimate_distance(jnp.asarray(rgb), parameters, 1.0).distance),
+        "network": lambda rgb: network_distance(parameters, rgb, options.height),
+    }
     methods |= {"box": box_distance} if options.box else {}
-    sets = [traced_rooms(options.rooms), rendered_rooms(options.rendered) if options.rendered else {}]
-    for examples in filter(None, sets):
-        rows = [_row(name, *pair, methods, options.pictures) for name, pair in examples.items()]
-        for number, method in enumerate(methods):
-            mean = np.mean([row[number] for row in rows], axis=0)
-            print(f"MEAN of {len(rows)}: {method} {_figures(mean)}", flush=True)
+    sets = {"traced": traced_rooms(options.rooms)}
+    sets |= {"rendered": rendered_rooms(options.rendered)} if options.rendered else {}
+    told = {}
+    for kind, examples in sets.items():
+        rows = {name: _row(name, *pair, methods, options.pictures) for name, pair in examples.items()}
+        for method in methods:
+            mean, error, _ = over_rooms(jnp.array([row[method] for row in rows.values()]))
+            print(f"MEAN of {len(rows)} {kind}: {method} {_told(mean)}\n  +- {_told(error)}", flush=True)
+        told[kind] = {name: {m: dict(zip(FIGURES, map(float, r), strict=True)) for m, r in row.items()}
+                      for name, row in rows.items()}  # fmt: skip
+    if options.json:
+        write_text(options.json, json.dumps(told, indent=1) + "\n")
 
 
-def _row(name: str, rgb: np.ndarray, true: np.ndarray, methods: dict, pictures: Path | None) -> list[np.ndarray]:
-    """Of each method: AbsRel, share within 1.25, both after one scale, seconds."""
-    results, maps = [], [true]
-    for estimate in methods.values():
+def _row(name: str, rgb: np.ndarray, true: np.ndarray, methods: dict, pictures: Path | None) -> dict[str, list[float]]:
+    """The FIGURES of each method."""
+    results, maps = {}, [true]
+    for method, estimate in methods.items():
         begun = time.perf_counter()
-        maps.append(estimate(rgb))
+        found = estimate(rgb)
         seconds = time.perf_counter() - begun
-        scale = np.median(true[true > 0] / maps[-1][true > 0])
-        both = [distance_errors(jnp.asarray(maps[-1] * s), true, true > 0) for s in (1, scale)]
-        results.append(np.array([float(x) for e in both for x in (e.abs_rel, e.delta)] + [seconds]))
-    told = "  ".join(f"{method} {_figures(result)}" for method, result in zip(methods, results, strict=True))
-    print(f"{name:12} {told}", flush=True)
+        maps.append(found)
+        scale = np.median(true[true > 0] / found[true > 0])
+        both = [distance_errors(jnp.asarray(found * s), true, true > 0) for s in (1, scale)]
+        errors = [float(x) for e in both for x in (e.abs_rel, e.delta)]
+        results[method] = [*errors, *off_planes(found, true), seconds]
+    print(f"{name:12} " + "  ".join(f"{method} {_told(result)}" for method, result in results.items()), flush=True)
     if pictures:
         grey = [np.where(x > 0, np.clip(0.7 / np.maximum(x, 0.05), 0, 1), 0)[..., None] for x in maps]
         write_rgb(pictures / f"{name}.png", np.concatenate([rgb, *(np.repeat(x, 3, -1) for x in grey)]))
     return results
 
 
-def _figures(result: np.ndarray) -> str:
-    return "AbsRel {:.3f} d1.25 {:.3f} | scaled {:.3f} {:.3f} {:.1f}s".format(*result)
+def off_planes(estimate: np.ndarray, true: np.ndarray) -> tuple[float, float]:
+    """Root mean square relative distance of walls and floor from the planes they truly lie on, and from the plane that
+    fits each best; NaN where the truth is no box. Pixels over 10 % off, taken for a thing's, do not count."""
+    panorama = Panorama(jnp.zeros((*true.shape, 3)), jnp.asarray(true), jnp.asarray(true > 0))
+    shell, support = shell_from_distance(panorama)
+    rays = np.asarray(pixel_rays(*true.shape))
+    expected, face = map(np.asarray, meet_shell(shell, jnp.zeros(3), rays))
+    off = estimate / np.maximum(true, 1e-6) - 1
+    counts = (true > 0) & (np.abs(true / expected - 1) < _ON_PLANE) & (face != _CEILING) & (np.abs(off) < 0.1)
+    if float(support) < 0.5 or not counts.any():
+        return np.nan, np.nan
+    area = np.asarray(pixel_solid_angles(*true.shape)) * counts
+    from_best = np.zeros(true.shape)
+    for number in np.unique(face[counts]):
+        at = counts & (face == number)
+        points, weights = rays[at] * estimate[at][:, None], area[at][:, None]
+        points = points - np.sum(weights * points, axis=0) / np.sum(weights)
+        _, _, axes = np.linalg.svd(np.sqrt(weights) * points, full_matrices=False)
+        from_best[at] = points @ axes[2] / estimate[at]
+    return tuple(float(np.sqrt(np.sum(area * x**2) / np.sum(area))) for x in (off * counts, from_best))
+
+
+def _told(result: list[float]) -> str:
+    return "AbsRel {:.3f} d1.25 {:.3f} | scaled {:.3f} {:.3f} | off planes {:.4f}, best {:.4f} | {:.1f}s".format(
+        *result
+    )
 
 
 if __name__ == "__main__":

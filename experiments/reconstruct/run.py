@@ -8,6 +8,8 @@ import numpy as np
 
 from experiments.reconstruct.config import ReconstructConfig
 from rein3d_jax.depth.level import Lean
+from rein3d_jax.explore.hidden import DOUBTFUL
+from rein3d_jax.geometry.sphere import pixel_solid_angles
 from rein3d_jax.io.rooms.traced_room import View
 from rein3d_jax.pipeline.reconstruct import Reconstruction
 
@@ -28,6 +30,13 @@ class Run:
         """Where the distance came from, in few words."""
         estimate = {"shell": "room-shell estimate", "network": "depth network's estimate"}
         return estimate[self.config.depth.method] if self.estimated else "given"
+
+    @property
+    def in_doubt(self) -> float:
+        """Share of the sphere whose distance is doubtful; 0 where it was given, or nobody knows."""
+        doubt = self.result.panorama.doubt
+        area = pixel_solid_angles(*doubt.shape)
+        return float(jnp.sum(area * (doubt > DOUBTFUL)) / jnp.sum(area * jnp.ones(doubt.shape)))
 
     @property
     def backdrop(self) -> jax.Array:

@@ -9,6 +9,7 @@ import numpy as np
 from experiments.reconstruct.quality import is_novel
 from experiments.reconstruct.run import Pictures, Run
 from experiments.reconstruct.sources import sources
+from rein3d_jax.explore.hidden import DOUBTFUL
 from rein3d_jax.explore.profile import ExploreConfig, travel
 from rein3d_jax.explore.trajectories import Trajectories
 from rein3d_jax.io.pictures.image import encode_jpeg
@@ -53,7 +54,8 @@ def _distance_origin(run: Run) -> str:
         return "given with the panorama" + (f": {run.converted}." if run.converted else ".")
     how = {
         "shell": "an empty box was fitted to its wall, floor and ceiling edges: furniture is painted onto it",
-        "network": "a network that has seen other rooms said how far each pixel is",
+        "network": "a network that has seen other rooms said how far each pixel is, and walls were put where the "
+        "picture has their lines",
     }[run.config.depth.method]
     said = f"{run.distance_origin}. The photograph came without depth, so {how}"
     told = "a guess" if run.config.input.camera_height is None else "as given"
@@ -68,6 +70,11 @@ def _warnings(run: Run, metrics: dict):
         yield (
             "The scale is a guess: every length follows the height of the camera above the floor, for which "
             f"{run.config.input.eye_height} m was taken. Measure it and give it with --set input.camera_height."
+        )
+    if run.in_doubt:
+        yield (
+            f"The distance was estimated; for {run.in_doubt:.0%} of the panorama it may be wrong by {DOUBTFUL:.0%} or "
+            "more. Cameras keep away from there, and mirrors, glass and what is seen through doors are seldom right."
         )
     unknown = 1 - float(jnp.mean(run.result.panorama.valid))
     if unknown > 0.001:
@@ -105,6 +112,9 @@ def _parts(run: Run, pictures: Pictures):
     depth = colour_map(panorama.distance, panorama.valid, near, far)
     caption = f"The panorama, and how far each pixel is. {run.lean.sentence}"
     pictures_in = (_jpeg("panorama", panorama.rgb), _jpeg("distance", depth))
+    if run.in_doubt:
+        caption += f" The third picture is doubt: bright where the distance may be wrong by {DOUBTFUL:.0%} or more."
+        pictures_in += (_jpeg("doubt", colour_map(panorama.doubt, panorama.valid, 0.0, DOUBTFUL)),)
     yield Section("What went in", caption, pictures_in, scale=(float(near), float(far)), wide=True)
     for order, index in enumerate(longest(run.result.trajectories)):
         yield _path(run.result, index, pictures.coarse_ends[order], pictures.refined_ends[order])

@@ -43,9 +43,7 @@ class Lean:
     """Where a picture's room has its up, and how plain that is."""
 
     up: jax.Array  # (3,) unit, in the picture's axes: those of `pixel_rays`, as if it stood level
-    confidence: (
-        jax.Array
-    )  # () by how much of its support the best up stands above the next, in [0, 1]; -1: nobody asked
+    confidence: jax.Array  # () share of its support by which the best up beats the next, in [0, 1]; -1: nobody asked
 
     @property
     def degrees(self) -> float:

@@ -11,7 +11,7 @@ from rein3d_jax.geometry.sphere import pixels_from_rays
 from rein3d_jax.scene import Panorama
 
 _STEPS = 24  # places tried along a ray, 6 % apart; even, so that the guess itself is one of them
-_DOUBTFUL = 0.2  # relative error expected of a distance above which what was lifted there may be wrong
+DOUBTFUL = 0.2  # relative error expected of a distance above which what was lifted there may be wrong
 _MARGIN = 0.02  # relative: what lies this little in front of a surface lies on it
 
 
@@ -35,7 +35,7 @@ def in_doubt(panorama: Panorama, points: jax.Array) -> jax.Array:
     """Whether the distance that `panorama` shows in the direction of points (..., 3) is doubtful: (...) bool."""
     if panorama.doubt is None:
         return jnp.zeros(points.shape[:-1], bool)
-    return _in_direction(panorama.doubt, points) > _DOUBTFUL
+    return _in_direction(panorama.doubt, points) > DOUBTFUL
 
 
 @jax.jit

@@ -51,9 +51,10 @@ def reconstruct(
 ) -> Reconstruction:
     """The scene of a panorama (h, 2 h): lifted, explored, restored and refined (paper Sec. 3).
 
-    Distances that are not `valid` are completed; where none is, an empty box is fitted to the picture, taken
-    `camera_height` metres above the floor (`with_distance` estimates better ones). `network` is the trained restorer,
-    where stages.restore names one. Runs outside jit; every stage in it is compiled. The same key gives the same bytes.
+    Distances that are not `valid` are completed. Where none is, `with_distance` estimates them beforehand; with
+    stages.depth.method "shell" an empty box is fitted here, for a camera `camera_height` metres above the floor.
+    `network` is the trained restorer, where stages.restore names one. Runs outside jit; every stage in it is compiled.
+    The same key gives the same bytes.
     """
     panorama, _ = with_distance(panorama, stages, camera_height=camera_height)
     known = survey(panorama, stages)

@@ -28,10 +28,10 @@ class Survey:
 def with_distance(
     panorama: Panorama, stages: Stages, network: dict | None = None, *, camera_height: float = EYE_HEIGHT
 ) -> tuple[Panorama, bool]:
-    """The panorama with a distance everywhere, and whether it was estimated: where none is known, an empty box is
-    fitted to the picture's edges, or the depth network (its parameters, `read_depth_network`'s) says it, as
-    stages.depth.method wants, for a camera `camera_height` metres above the floor; then what is unknown is completed,
-    and `valid` still says what was known."""
+    """The panorama with a distance everywhere, and whether it was estimated: where none is known, `estimate_distance`
+    says it, by the depth network's parameters (`read_depth_network`'s), or an empty box is fitted to the picture's
+    edges, as stages.depth.method wants, for a camera `camera_height` metres above the floor; then what is unknown is
+    completed, and `valid` still says what was known."""
     estimated = not bool(panorama.valid.any())
     if estimated and stages.depth.method == "shell":
         box, _ = fit_room_shell(panorama.rgb, camera_height, config=stages.shell)

@@ -66,7 +66,7 @@ class Report:
     title: str
     summary: str
     facts: tuple[tuple[str, str], ...] = ()  # (name, value), the numbers to see first
-    distance_origin: str = ""  # "given" or "room-shell estimate", with what that means
+    distance_origin: str = ""  # "given" or what estimated it, with what that means
     warnings: tuple[str, ...] = ()
     parts: tuple[Section | Comparison, ...] = ()
     standing: Scatter | None = None  # this run among what was measured before

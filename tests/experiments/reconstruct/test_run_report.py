@@ -14,6 +14,7 @@ from experiments.reconstruct.run import Pictures, Run
 from experiments.reconstruct.run_report import longest, run_report
 from experiments.reconstruct.sources import sources
 from experiments.run_folder import open_run
+from rein3d_jax.depth.estimate import DepthConfig
 from rein3d_jax.depth.level import unasked_lean
 from rein3d_jax.geometry.poses import pinhole_camera, upright
 from rein3d_jax.io.rooms.traced_room import View
@@ -91,7 +92,11 @@ def test_warnings_in_plain_words(run, changes, words):
 def test_a_guessed_scale_is_told(run):
     found = report(dataclasses.replace(run, estimated=True))
     assert any("scale is a guess" in warning and "input.camera_height" in warning for warning in found.warnings)
+    assert "depth network's estimate" in found.distance_origin
+    boxed = dataclasses.replace(run.config, depth=DepthConfig(method="shell"))
+    found = report(dataclasses.replace(run, estimated=True, config=boxed))
     assert "room-shell estimate" in found.distance_origin
+    assert any("furniture will look flat" in warning for warning in found.warnings)
 
 
 def test_what_was_done_to_a_given_map_is_told(run):
@@ -134,3 +139,15 @@ def test_the_credit_of_ones_own_picture_is_shown(tmp_path):
     assert "a.jpg. The file says: Somebody; (c) <script>" in said and "\n" not in said and len(said) < 600
     cv2.imwrite(str(tmp_path / "b.png"), np.zeros((16, 32, 3), np.uint8))
     assert "names no author and no licence" in sources(str(tmp_path / "b.png"))[0]
+
+
+def test_doubt_is_shown_where_there_is_any(run):
+    assert "picture of doubt" not in render_report(report(run)) and "third picture is doubt" not in render_report(
+        report(run)
+    )
+    panorama = run.result.panorama
+    half = panorama.replace(doubt=np.where(np.arange(panorama.doubt.shape[1]) % 2, 0.5, 0.0) + 0 * panorama.doubt)
+    doubtful = dataclasses.replace(run, result=run.result.replace(panorama=half))
+    assert abs(doubtful.in_doubt - 0.5) < 1e-6  # every second column
+    page = render_report(report(doubtful))
+    assert "third picture is doubt" in page and "for 50% of the panorama" in page
