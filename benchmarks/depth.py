@@ -28,7 +28,7 @@ from rein3d_jax.depth.shell_from_distance import shell_from_distance
 from rein3d_jax.evaluate.distance_error import distance_errors
 from rein3d_jax.evaluate.standard_error import over_rooms
 from rein3d_jax.geometry.pyramid import double
-from rein3d_jax.geometry.shell import meet_shell
+from rein3d_jax.geometry.shell import FACES, meet_shell
 from rein3d_jax.geometry.sphere import pixel_rays, pixel_solid_angles
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.pictures.distance import read_distance
@@ -38,6 +38,7 @@ from rein3d_jax.scene import Panorama
 
 FIGURES = "abs_rel", "within", "abs_rel_scaled", "within_scaled", "off_planes", "off_best_planes", "seconds"
 _ON_PLANE = 0.02  # relative distance of the truth from its room's box
+_FEWEST = 100  # pixels of a face
 _CEILING = 4  # among RoomShell's faces
 
 
@@ -133,6 +134,7 @@ def off_planes(estimate: np.ndarray, true: np.ndarray) -> tuple[float, float]:
     expected, face = map(np.asarray, meet_shell(shell, jnp.zeros(3), rays))
     off = estimate / np.maximum(true, 1e-6) - 1
     counts = (true > 0) & (np.abs(true / expected - 1) < _ON_PLANE) & (face != _CEILING) & (np.abs(off) < 0.1)
+    counts &= np.bincount(face[counts], minlength=FACES)[face] >= _FEWEST  # a corner of a wall has no plane of its own
     if float(support) < 0.5 or not counts.any():
         return np.nan, np.nan
     area = np.asarray(pixel_solid_angles(*true.shape)) * counts

@@ -16,7 +16,7 @@ from rein3d_jax.geometry.sphere import pixel_rays, pixel_solid_angles
 
 _FLOOR = 0.97  # camera heights below the camera from which on a background is floor
 _AGREES = 0.12  # log of distance by which a shell may be off the background
-_BELIEVED = 0.7  # share of walls and ceiling that has to agree, or the shell is no witness
+_BELIEVED = 0.8  # share of walls and ceiling that has to agree, or the shell is no witness
 _OFF_FLOOR, _OFF_WALLS = 0.05, 0.1  # log of distance by which what is no floor, no wall and no ceiling is off it
 _BEYOND = 0.3  # the same of what is farther than walls and ceiling
 _HIDDEN = 0.12  # log of distance by which a thing has to stand before a line of the room to hide it

@@ -2,7 +2,7 @@
 
 The network knows which room it is, but not to the pixel where its lines run, and takes its size from what rooms usually
 are; the lines of the picture say both, but have many readings. So the fit starts from the network's room, may change
-its size by some 15 % and each wall by some 6 % more, and counts only where the network sees the room itself and no
+its size by some 12 % and each wall by some 6 % more, and counts only where the network sees the room itself and no
 furniture. All of it is one pure function: random search, no gradients."""
 
 from functools import partial
@@ -24,7 +24,7 @@ from rein3d_jax.geometry.shell import RoomShell
 from rein3d_jax.scene import Panorama
 
 # Standard deviations about the network's room: log of its size, log of each length beside that, yaw in radians.
-_SIZE, _LENGTH, _YAW = 0.15, 0.06, 0.05
+_SIZE, _LENGTH, _YAW = 0.12, 0.06, 0.05
 _PRIOR = 0.02  # loss of one squared standard deviation
 _STARTS, _KEPT, _CHILDREN = 64, 16, 8
 _COARSE_STEPS, _FINE_STEPS = (0.15, 0.02, 8), (0.02, 0.001, 12)  # first, last, rounds

@@ -23,7 +23,7 @@ class DepthNetworkConfig(Settings):
     horizon: int = setting(192, "channels of a column of the horizon branch", within=_COUNT)
     heads: int = setting(4, "of the horizon branch's attention; divide `horizon`", within=_COUNT)
     layers: int = setting(3, "of the horizon branch", within=_COUNT)
-    looks: int = setting(0, "at the lines in which walls meet floor and ceiling", within="[0, inf)")
+    looks: int = setting(2, "at the lines in which walls meet floor and ceiling", within="[0, inf)")
     bands: int = setting(
         32, "of latitude, to which the horizon branch averages rows at stride 4; half as many at 8, a quarter above",
         within="[4, inf)",
