@@ -1,5 +1,6 @@
-"""Estimated distance against rooms with truth: what reconstruct takes, the network alone, the fitted box; AbsRel, the
-share within 1.25, and how far walls and floor are from flat.
+"""Estimated distance against rooms with truth: AbsRel, the share within 1.25, how flat walls are.
+
+The estimate that reconstruct takes beside the network alone and the fitted box.
 
     python -m benchmarks.depth ROOMS [--weights FOLDER] [--rendered FOLDER] [--height 128] [--box] [--pictures FOLDER]
 

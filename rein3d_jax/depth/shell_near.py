@@ -25,7 +25,7 @@ from rein3d_jax.scene import Panorama
 
 # Standard deviations about the network's room: log of its size, log of each length beside that, yaw in radians.
 _SIZE, _LENGTH, _YAW = 0.12, 0.06, 0.05
-_PRIOR = 0.02  # loss of one squared standard deviation
+_PRIOR, _LAST_PRIOR = 0.02, 0.004  # loss of one squared standard deviation, at first and at last
 _STARTS, _KEPT, _CHILDREN = 64, 16, 8
 _COARSE_STEPS, _FINE_STEPS = (0.15, 0.02, 8), (0.02, 0.001, 12)  # first, last, rounds
 
@@ -43,10 +43,10 @@ def fit_shell_near(rgb: jax.Array, background: jax.Array, seen: jax.Array, *, co
     boxes = first + sizes + spread * jax.random.normal(start, (_STARTS, 6))
     boxes = boxes.at[0].set(first)
 
-    def descend(boxes, key, steps, support, colour_weight):
+    def descend(boxes, key, steps, support, prior):
         def loss(box):
-            informed = colour_weight * colour_information(box, evidence) if colour_weight else 0.0
-            return _PRIOR * _unlikely(box, first) - support(box, evidence, config.edge_weights) - informed
+            informed = config.colour_weight * colour_information(box, evidence)
+            return prior * _unlikely(box, first) - support(box, evidence, config.edge_weights) - informed
 
         first_step, last_step, rounds = steps
         sizes = first_step * (last_step / first_step) ** jnp.linspace(0, 1, rounds)
@@ -54,8 +54,8 @@ def fit_shell_near(rgb: jax.Array, background: jax.Array, seen: jax.Array, *, co
         boxes, losses = jax.lax.scan(lambda boxes, x: climb(boxes, *x, loss, _CHILDREN), boxes, each)
         return boxes[jnp.argsort(losses[-1])]
 
-    boxes = descend(boxes, coarse, _COARSE_STEPS, coarse_support, config.colour_weight)[:_KEPT]
-    return shell_of(descend(boxes, fine, _FINE_STEPS, fine_support, config.colour_weight)[0], 1.0)
+    boxes = descend(boxes, coarse, _COARSE_STEPS, coarse_support, _PRIOR)[:_KEPT]
+    return shell_of(descend(boxes, fine, _FINE_STEPS, fine_support, _LAST_PRIOR)[0], 1.0)
 
 
 def _unlikely(box: jax.Array, first: jax.Array) -> jax.Array:

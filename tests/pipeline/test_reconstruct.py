@@ -80,7 +80,7 @@ def test_a_limit_on_the_count_holds(panorama) -> None:
 
 def test_without_a_known_distance_a_box_is_fitted(panorama) -> None:
     unknown = panorama.replace(valid=jnp.zeros_like(panorama.valid))
-    placed, fitted = r3d.with_distance(unknown, STAGES)
+    placed, fitted = r3d.with_distance(unknown, dataclasses.replace(STAGES, depth=DepthConfig(method="shell")))
     assert fitted and bool(placed.valid.all()) and float(placed.distance.min()) > 0
     assert not r3d.with_distance(panorama, STAGES)[1]
 

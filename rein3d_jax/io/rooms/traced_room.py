@@ -19,10 +19,10 @@ from rein3d_jax.conventions import PINHOLE
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.json_file import path_within, read_json
 from rein3d_jax.io.pictures.decode import open_image
+from rein3d_jax.io.pictures.distance import read_distance
 from rein3d_jax.io.pictures.image import read_rgb
-from rein3d_jax.io.pictures.panorama import read_panorama
 from rein3d_jax.io.rooms.posed_panorama import PosedPanorama, panorama_pose, rigid_pose
-from rein3d_jax.scene import Camera
+from rein3d_jax.scene import Camera, Panorama
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,9 @@ def _view(path: Path, entry: dict[str, Any], anywhere: bool) -> View:
 def _pano(path: Path, entry: dict[str, Any]) -> PosedPanorama:
     pose = _pano_pose(entry["c2w"])
     rgb, distance = (path_within(path.parent, entry[name], named_by=path) for name in ("rgb", "distance"))
-    return PosedPanorama(entry["rgb"], read_panorama(rgb, distance=distance), pose)
+    picture = read_rgb(rgb)
+    metres, valid = read_distance(distance, picture.shape[:2])  # a truth of another size is another picture's
+    return PosedPanorama(entry["rgb"], Panorama(*map(jnp.asarray, (picture, metres, valid))), pose)
 
 
 def _frame(path: Path, entry: dict[str, Any], size: tuple[int, int]) -> VideoFrame:

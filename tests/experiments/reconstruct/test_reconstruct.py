@@ -16,6 +16,7 @@ from experiments.reconstruct.inputs import SAMPLES, InputConfig, input_panorama,
 from experiments.reconstruct.quality import is_novel
 from experiments.reconstruct.stage_store import StageStore, blank_stages, read_stage
 from experiments.run_folder import open_run
+from rein3d_jax.depth.estimate import DepthConfig
 from rein3d_jax.geometry.poses import equirectangular_camera, upright
 from rein3d_jax.io.pictures.image import write_rgb
 from rein3d_jax.io.splats.ply import read_ply
@@ -251,7 +252,8 @@ def test_a_partly_unknown_depth_is_taken_with_its_mask(tmp_path):
 def test_a_photograph_alone_gets_a_fitted_room(tmp_path):
     config, stages = InputConfig(str(SAMPLES / "hotel_room.jpg"), None, None, 64), Stages()
     shell = dataclasses.replace(stages.shell, climbers=32, rounds=4)
-    panorama, fitted = with_distance(input_panorama(config), dataclasses.replace(stages, shell=shell))
+    stages = dataclasses.replace(stages, shell=shell, depth=DepthConfig(method="shell"))
+    panorama, fitted = with_distance(input_panorama(config), stages)
     assert fitted
     # Straight down is the camera's height exactly, whatever the fit; the nearest row is 1.4 degrees off.
     np.testing.assert_allclose(panorama.distance[-1], 1.6, rtol=1e-3)
