@@ -18,7 +18,7 @@ COLOURS = jnp.array(
 
 
 def painted():
-    """Six flat colours; with the thing's rays those of a red block that hides a wall's foot."""
+    """The room in six flat colours."""
     _, face = meet_shell(TRUE, jnp.zeros(3), pixel_rays(H, W))
     return COLOURS[face]
 
