@@ -18,6 +18,7 @@ import numpy as np
 
 from experiments.command import CommandParser
 from rein3d_jax.depth.level import NOT_TOLD, Lean, estimate_lean, level_panorama
+from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.pictures.image import read_rgb
 from rein3d_jax.scene import Panorama
 
@@ -47,7 +48,7 @@ def _run(options: argparse.Namespace) -> None:
         print(f"{lean:>4}  " + "  ".join(f"{name} {value:.2f}" for name, value in summary.items()), flush=True)
     if options.json:
         figures = {"rooms": list(pictures), "seeds": options.seeds, "device": jax.devices()[0].device_kind}
-        options.json.write_text(json.dumps(figures | {"table": table, "pictures": rows}, indent=1) + "\n")
+        write_text(options.json, json.dumps(figures | {"table": table, "pictures": rows}, indent=1) + "\n")
 
 
 def _measured(rgb: np.ndarray, lean: float, rng: np.random.Generator) -> dict:

@@ -30,7 +30,6 @@ from rein3d_jax.io.pictures.panorama import read_panorama
 from rein3d_jax.networks.depth import read_depth_network
 from rein3d_jax.pipeline.survey import with_distance
 from rein3d_jax.report.colour_map import colour_map, colour_range
-from rein3d_jax.scene import Panorama
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -53,7 +52,8 @@ def _estimate(options: argparse.Namespace) -> None:
     config = load_config(ReconstructConfig, options.config, given + options.set)
     rows = panorama_rows(resolve(config.input.panorama))  # a picture that is none is refused before the long part
     panorama, told, lean = told_panorama(config.input)
-    placed, estimated = _with_distance(panorama, config)
+    network = read_depth_network() if config.asks_network else None
+    placed, estimated = with_distance(panorama, config, network, camera_height=config.input.eye_height)
     distance = resize_distance(np.where(placed.valid, placed.distance, np.float32(0)), rows)
     write_distance_exr(output, distance)
     known = distance > 0
@@ -78,12 +78,6 @@ def _estimate(options: argparse.Namespace) -> None:
     if options.json:
         write_text(options.json, json.dumps(facts, indent=2) + "\n")
     print(_line(facts))
-
-
-def _with_distance(panorama: Panorama, config: ReconstructConfig) -> tuple[Panorama, bool]:
-    wanted = config.input.distance is None and config.depth.method == "network"
-    network = read_depth_network() if wanted else None
-    return with_distance(panorama, config, network, camera_height=config.input.eye_height)
 
 
 def _line(facts: dict) -> str:

@@ -18,3 +18,8 @@ class ReconstructConfig(Stages):
     input: InputConfig = InputConfig()
     film: FilmConfig = FilmConfig()
     budget: BudgetConfig = BudgetConfig()
+
+    @property
+    def asks_network(self) -> bool:
+        """Whether the distance is the depth network's to say."""
+        return self.input.distance is None and self.depth.method == "network"

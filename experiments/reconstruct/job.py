@@ -77,12 +77,11 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str, Lean]:
     """Everything up to the refined scene; whether the distance was estimated, what was done to a given one, and how the
     picture leaned."""
     config, key = job.config, jax.random.key(job.config.seed)
-    network = config.input.distance is None and config.depth.method == "network"
-    weights = files_digest(SHIPPED_DEPTH) if network else ""
+    weights = files_digest(SHIPPED_DEPTH) if config.asks_network else ""
     given = config.input
     read = [given.height, given.level, given.eye_height, given.distance_kind, given.scale]
     depends = [files, *read, job.settings("depth"), job.settings("shell"), weights, jax.__version__]
-    panorama, estimated, told, lean = job.stage("read", depends, lambda: _read(config, weights))
+    panorama, estimated, told, lean = job.stage("read", depends, lambda: _read(config))
     coarse = job.stage("lift", job.settings("lift"), lambda: lift_scene(panorama, config.lift))
     trajectories = job.stage(
         "explore", job.settings("explore"), lambda: radial_trajectories(panorama, config=config.explore)
@@ -96,8 +95,8 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str, Lean]:
     return joined(known, explored, (scene, curves, stopped), why), bool(estimated[0]), told, lean
 
 
-def _read(config: ReconstructConfig, weights: str):
-    network = read_depth_network() if weights else None
+def _read(config: ReconstructConfig):
+    network = read_depth_network() if config.asks_network else None
     panorama, told, lean = told_panorama(config.input)
     panorama, estimated = with_distance(panorama, config, network, camera_height=config.input.eye_height)
     return panorama, np.array([estimated]), told, lean

@@ -8,8 +8,8 @@ import numpy as np
 
 from experiments.reconstruct.config import ReconstructConfig
 from rein3d_jax.depth.level import Lean
+from rein3d_jax.evaluate.coverage import coverage
 from rein3d_jax.explore.hidden import DOUBTFUL
-from rein3d_jax.geometry.sphere import pixel_solid_angles
 from rein3d_jax.io.rooms.traced_room import View
 from rein3d_jax.pipeline.reconstruct import Reconstruction
 
@@ -34,9 +34,7 @@ class Run:
     @property
     def in_doubt(self) -> float:
         """Share of the sphere whose distance is doubtful; 0 where it was given, or nobody knows."""
-        doubt = self.result.panorama.doubt
-        area = pixel_solid_angles(*doubt.shape)
-        return float(jnp.sum(area * (doubt > DOUBTFUL)) / jnp.sum(area * jnp.ones(doubt.shape)))
+        return float(coverage(self.result.panorama.doubt > DOUBTFUL))
 
     @property
     def backdrop(self) -> jax.Array:

@@ -36,7 +36,6 @@ class Estimate:
     distance: jax.Array  # (h, 2 h) metres along each ray
     known: jax.Array  # (h, 2 h) bool, there is a distance: not the sky, not what is outside
     doubt: jax.Array  # (h, 2 h) mean relative error expected
-    support: jax.Array  # () share of walls and ceiling on which network and shell agree
 
 
 @partial(jax.jit, static_argnames=("config", "shell"))
@@ -53,8 +52,7 @@ def estimate_distance(
     the same distances, turned."""
     turn = _brightest_turn(rgb)
     estimate = _estimate(jnp.roll(rgb, -turn, axis=1), parameters, camera_height, config, shell)
-    turned_back = {name: jnp.roll(getattr(estimate, name), turn, axis=1) for name in ("distance", "known", "doubt")}
-    return estimate.replace(**turned_back)
+    return jax.tree.map(lambda x: jnp.roll(x, turn, axis=1), estimate)
 
 
 def _brightest_turn(rgb: jax.Array) -> jax.Array:
@@ -80,5 +78,4 @@ def _estimate(
         distance=camera_height * room.distance,
         known=at_size(found.unknown) < 0,
         doubt=jnp.exp(at_size(found.log_scale)),
-        support=room.support,
     )

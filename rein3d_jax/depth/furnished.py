@@ -29,15 +29,13 @@ class FurnishedRoom:
     """A room and what stands in it, over the camera's height."""
 
     distance: jax.Array  # (h, 2 h)
-    background: jax.Array  # (h, 2 h), of the empty room
     things: jax.Array  # (h, 2 h) bool: what is seen is not the empty room
-    support: jax.Array  # () share of walls and ceiling on which shell and network agree in shape
 
 
 def furnished_room(rgb: jax.Array, distance: jax.Array, background: jax.Array, shell: jax.Array) -> FurnishedRoom:
     """The FurnishedRoom of a picture (h, 2 h, 3) in sRGB from the network's distance and background and a shell's
     distance, all (h, 2 h) over the camera's height."""
-    empty, size, support = agreed_background(background, shell)
+    empty, size, _ = agreed_background(background, shell)
     thing = things(distance, background)
     whose = guided_by(rgb, thing) > 0.5
     # A thing's rim takes the distance of its inside, in inverse distance, whose planes are linear; what is all rim
@@ -46,7 +44,7 @@ def furnished_room(rgb: jax.Array, distance: jax.Array, background: jax.Array, s
     inside = jnp.where(window_sum((thing < 0.5).astype(thing.dtype), rim) == 0, 1.0, 1e-3 * thing)
     placed = distance * jnp.where(distance > background, size, 1.0)  # what is beyond is as much larger as the room
     inverse = push_pull((1 / placed)[..., None], inside)[..., 0]
-    return FurnishedRoom(jnp.where(whose, 1 / inverse, empty), empty, whose, support)
+    return FurnishedRoom(jnp.where(whose, 1 / inverse, empty), whose)
 
 
 def things(distance: jax.Array, background: jax.Array) -> jax.Array:
