@@ -2,6 +2,7 @@
 
 from rein3d_jax.lift.adaptive import lift_adaptively
 from rein3d_jax.lift.buffer import compact, merge, with_capacity
-from rein3d_jax.lift.lift import LiftConfig, lift
+from rein3d_jax.lift.config import LiftConfig
+from rein3d_jax.lift.lift import lift
 
 __all__ = ["LiftConfig", "compact", "lift", "lift_adaptively", "merge", "with_capacity"]

@@ -8,9 +8,10 @@ import jax.numpy as jnp
 
 from rein3d_jax.geometry.resample import pad_sphere
 from rein3d_jax.geometry.sphere import latitudes
-from rein3d_jax.lift.lift import LiftConfig
+from rein3d_jax.lift.config import LiftConfig
 from rein3d_jax.lift.moments import halves, of_pixels, paired, plane_residual, with_neighbours
 from rein3d_jax.lift.partition import Level
+from rein3d_jax.lift.surface import beside_steps
 
 _FORBIDDEN = 1e3  # colour costs stay below sqrt(3) a pixel
 _TILT = 0.08  # of a linear gradient's mean square that counts: neighbours that overlap show most of it between them
@@ -75,21 +76,3 @@ def _touching(apart: jax.Array, shape: tuple[int, int]) -> jax.Array:
     near = pad_sphere(apart, 1)
     near = near[:-2] | near[1:-1] | near[2:] if shape[0] > 1 else near[1:-1]
     return near[:, :-2] | near[:, 1:-1] | near[:, 2:] if shape[1] > 1 else near[:, 1:-1]
-
-
-def beside_steps(inverse: jax.Array, step: float) -> jax.Array:
-    """Pixels (h, w) bool beside a step: a neighbour's inverse distance differs by a slope of which those before and
-    after know nothing, `step` relative to the nearer surface."""
-    image = pad_sphere(inverse, 2)
-    right = _steps(image[2:-2], 1, step)
-    down = _steps(image[:, 2:-2], 0, step)
-    return right[:, 1:] | right[:, :-1] | down[1:] | down[:-1]
-
-
-def _steps(image: jax.Array, axis: int, step: float) -> jax.Array:
-    """Links along `axis`, one more than there are pixels within a padding of 2."""
-    links = image.shape[axis] - 3
-    a, b, c, d = (jax.lax.slice_in_dim(image, start, start + links, axis=axis) for start in range(4))
-    rise = c - b
-    sudden = jnp.minimum(jnp.abs(rise - (b - a)), jnp.abs(rise - (d - c)))
-    return sudden > step * jnp.maximum(b, c)

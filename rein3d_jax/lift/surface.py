@@ -1,4 +1,4 @@
-"""Which way the surface runs at each pixel of a panorama, and the splat's axes that follow it.
+"""Which way the surface runs at each pixel of a panorama, where it breaks off, and the axes that follow it.
 
 Over a plane, inverse distance is linear in the direction of the ray, so the surface's slope
 
@@ -13,7 +13,7 @@ import jax.numpy as jnp
 
 from rein3d_jax.geometry.resample import pad_sphere
 from rein3d_jax.geometry.safe import safe_norm
-from rein3d_jax.geometry.sphere import latitudes, pixel_rays
+from rein3d_jax.geometry.sphere import latitudes
 
 
 def slopes(distance: jax.Array, known: jax.Array) -> jax.Array:
@@ -36,19 +36,31 @@ def _limited(before: jax.Array, here: jax.Array, after: jax.Array) -> jax.Array:
     return jnp.where(agree, jnp.sign(first) * least, 0.0)
 
 
-def surface_axes(slope: jax.Array, height: int, width: int) -> tuple[jax.Array, jax.Array]:
-    """Orthonormal axes (h, w, 3, 3) as columns, in a panorama's own frame, and tangents of incidence (h, w).
+def beside_steps(inverse: jax.Array, step: float) -> jax.Array:
+    """Pixels (h, w) bool beside a step: a neighbour's inverse distance differs by a slope of which those before and
+    after know nothing, `step` relative to the nearer surface."""
+    image = pad_sphere(inverse, 2)
+    right = _steps(image[2:-2], 1, step)
+    down = _steps(image[:, 2:-2], 0, step)
+    return right[:, 1:] | right[:, :-1] | down[1:] | down[:-1]
+
+
+def _steps(image: jax.Array, axis: int, step: float) -> jax.Array:
+    """Links along `axis`, one more than there are pixels within a padding of 2."""
+    links = image.shape[axis] - 3
+    a, b, c, d = (jax.lax.slice_in_dim(image, start, start + links, axis=axis) for start in range(4))
+    rise = c - b
+    sudden = jnp.minimum(jnp.abs(rise - (b - a)), jnp.abs(rise - (d - c)))
+    return sudden > step * jnp.maximum(b, c)
+
+
+def axes_at(ray: jax.Array, slope: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Orthonormal axes (..., 3, 3) as columns at rays (..., 3) with slopes (..., 2); tangents of incidence (...); the
+    unit vector (..., 2), towards growing columns and upward, along which the surface falls away.
 
     The first axis runs along the surface where it falls away most, the second across it, the third is its normal. Seen
     from the panorama's centre, a disc stretched along the first by sqrt(1 + tangent^2) is round.
     """
-    axes, steep, _ = axes_at(pixel_rays(height, width), slope)
-    return axes, steep
-
-
-def axes_at(ray: jax.Array, slope: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """The axes of `surface_axes` at rays (..., 3) with slopes (..., 2); tangents of incidence; the unit vector (...,
-    2), towards growing columns and upward, along which the surface falls away."""
     steep = safe_norm(slope)
     some = steep > 1e-6
     way = jnp.where(some[..., None], slope / jnp.where(some, steep, 1.0)[..., None], jnp.array([1.0, 0.0]))

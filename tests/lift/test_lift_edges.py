@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rein3d_jax.geometry.sphere import pixel_rays
+from rein3d_jax.lift import LiftConfig
 from rein3d_jax.lift.edges import snap_edges
-from rein3d_jax.lift.lift import LiftConfig
 
 HEIGHT, WIDTH = 192, 384  # the least width at which the default ramp is not shortened
 NEAR = 2.0
