@@ -66,7 +66,7 @@ def _estimate(options: argparse.Namespace) -> None:
     facts = {
         "distance": str(output),
         "size": [2 * rows, rows],
-        "worked_at": [2 * config.input.height, config.input.height],
+        "worked_at": [2 * len(panorama.rgb), len(panorama.rgb)],
         "method": config.depth.method if estimated else "given",
         "converted": told,
         "lean": lean.sentence,

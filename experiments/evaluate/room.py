@@ -102,8 +102,8 @@ class EvaluationRoom:
 
     @cached_property
     def panorama(self) -> Panorama:
-        """The input at the recipe's height, its distance complete."""
-        return self._input_at(self.config.input.height)
+        """The input at the rows that the recipe works at, its distance complete."""
+        return self._input_at(self.config.input.rows(len(self.given.rgb)))
 
     @cached_property
     def backdrop(self) -> jax.Array:

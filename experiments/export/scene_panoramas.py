@@ -29,7 +29,7 @@ def viewpoints(run: RunFolder) -> dict[str, jax.Array]:
 
 def panoramas(run: RunFolder, poses: dict[str, jax.Array]) -> Iterator[Video]:
     """Videos of one frame each of the refined scene, as high as the run worked at; distance 0 where nothing is."""
-    raster, height, buffers = run.config.rasterize, run.config.input.height, None
+    raster, height, buffers = run.config.rasterize, len(run.panorama.rgb), None
     for pose in poses.values():
         frame, buffers = render_video(run.refined, pose[None], height, config=raster, buffers=buffers)
         yield frame.replace(distance=jnp.where(frame.alpha > _SEEN, frame.distance, 0.0))

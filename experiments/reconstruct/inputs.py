@@ -13,7 +13,7 @@ from rein3d_jax.depth.level import Lean, estimate_lean, levelled, unasked_lean
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.poses import rigid
 from rein3d_jax.io.files.input_file import require_file
-from rein3d_jax.io.pictures.image import read_rgb
+from rein3d_jax.io.pictures.image import panorama_rows, read_rgb
 from rein3d_jax.io.pictures.panorama import read_panorama
 from rein3d_jax.io.rooms import traced_room
 from rein3d_jax.io.rooms.traced_room import View
@@ -21,6 +21,7 @@ from rein3d_jax.scene import Panorama
 from rein3d_jax.settings import Settings, setting
 
 SAMPLES = Path(__file__).parents[1] / "samples"
+_STEP, _FEWEST = 32, 64  # rows to work at
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,7 +34,11 @@ class InputConfig(Settings):
         "sample:room/input_distance.exr", "metres along each ray: EXR, 16-bit PNG (mm), NPY, NPZ; none: it is estimated"
     )
     views: str | None = setting("sample:room/scene.json", "ground-truth views, for measuring only")
-    height: int = setting(256, "rows that the job works at, a multiple of 32", within="[64, 4096]")
+    height: int = setting(
+        256,
+        "rows to work at, a multiple of 32; a smaller picture keeps its own",
+        within="[64, 4096]",
+    )
     level: bool = setting(True, "a picture that leans is levelled before all else; false: it is taken as level")
     camera_height: float | None = setting(
         None, f"of the lens above the floor: the scale; none: {EYE_HEIGHT}, a guess", within="(0, inf)", unit="metres"
@@ -51,8 +56,12 @@ class InputConfig(Settings):
 
     def __post_init__(self):
         super().__post_init__()
-        if self.height % 32:
-            raise InputError(f"height must be a multiple of 32, not {self.height}")
+        if self.height % _STEP:
+            raise InputError(f"height must be a multiple of {_STEP}, not {self.height}")
+
+    def rows(self, of_picture: int) -> int:
+        """Rows to work at for a picture of so many: no more than it has."""
+        return min(self.height, max(of_picture // _STEP * _STEP, _FEWEST))
 
     @property
     def eye_height(self) -> float:
@@ -82,10 +91,11 @@ def told_panorama(config: InputConfig) -> tuple[Panorama, str, Lean]:
     path = resolve(config.panorama)
     require_file(path)
     if config.distance is None:
-        panorama, lean = _levelled(read_panorama(path, height=config.height), config)
+        panorama, lean = _levelled(read_panorama(path, height=config.rows(panorama_rows(path))), config)
         return panorama, "", lean
     given, kind = resolve(config.distance), config.distance_kind
-    panorama, converted = given_distance(read_rgb(path), given, kind, config.height)
+    rgb = read_rgb(path)
+    panorama, converted = given_distance(rgb, given, kind, config.rows(len(rgb)))
     panorama, lean = _levelled(panorama, config)  # a floor is looked for below
     panorama, scaled = in_metres(panorama, given, config.eye_height if config.scaled else None)
     return panorama, "; ".join(filter(None, (converted, scaled))), lean

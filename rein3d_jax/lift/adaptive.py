@@ -12,11 +12,12 @@ import jax
 import jax.numpy as jnp
 
 from rein3d_jax.errors import InputError
+from rein3d_jax.geometry.resample import pad_sphere
 from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.lift.config import LiftConfig
-from rein3d_jax.lift.leaf_cost import largest_side, leaf_costs
+from rein3d_jax.lift.leaf_cost import largest_side, leaf_costs, levels_of
 from rein3d_jax.lift.lift import lift
-from rein3d_jax.lift.partition import Leaves, partition
+from rein3d_jax.lift.partition import Leaves, Level, partition
 from rein3d_jax.lift.patches import Patches, gaussians_of, pixel_traits, with_steps
 from rein3d_jax.scene import Gaussians, Panorama
 
@@ -64,7 +65,9 @@ def _prepared(panorama: Panorama, config: LiftConfig) -> tuple[jax.Array, jax.Ar
 def _gaussians_of(leaves: Leaves, rgb, distance, known, world_from_camera, config: LiftConfig) -> Gaussians:
     height, width = distance.shape
     mean, alive = _means(leaves, capacity_of(height, width, config))
-    traits = jax.tree.map(mean, pixel_traits(rgb, distance, known, config))
+    traits = pixel_traits(rgb, distance, known, config)
+    wide = _overlap_of_leaves(traits.overlap, leaves, levels_of(height, width, config.max_leaf_side))
+    traits = jax.tree.map(mean, traits.replace(overlap=wide))
     ray, inverse = mean(pixel_rays(height, width)), mean(1 / distance)
     # Over a plane inverse distance is linear in the ray: the mean ray over the mean inverse lies on it.
     middle = ray / jnp.where(alive, inverse, 1.0)[:, None]
@@ -72,6 +75,18 @@ def _gaussians_of(leaves: Leaves, rgb, distance, known, world_from_camera, confi
     traits = traits.replace(overlap=jnp.where(alive, traits.overlap, 1.0))
     patches = Patches(middle, sides, traits, alive)
     return gaussians_of(patches, world_from_camera, pitch=jnp.pi / height, config=config)
+
+
+def _overlap_of_leaves(overlap: jax.Array, leaves: Leaves, levels: list[Level]) -> jax.Array:
+    """The overlap (h, w) of each pixel's leaf: the least of it and the eight of its size around it. A leaf's flanks
+    reach as far beyond it as it is wide, and would lie on its neighbours' detail."""
+    height, width = overlap.shape
+    for rows, columns in ((1 << j, 1 << k) for j, k in levels[1:]):
+        cells = pad_sphere(overlap.reshape(height // rows, rows, width // columns, columns).min((1, 3)), 1)
+        least = jax.lax.reduce_window(cells, jnp.inf, jax.lax.min, (3, 3), (1, 1), "valid")
+        here = (leaves.sides == jnp.array([rows, columns])).all(-1)
+        overlap = jnp.where(here, jnp.repeat(jnp.repeat(least, rows, axis=0), columns, axis=1), overlap)
+    return overlap
 
 
 def _means(leaves: Leaves, capacity: int):

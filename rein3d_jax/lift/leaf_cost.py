@@ -24,7 +24,7 @@ def leaf_costs(rgb: jax.Array, distance: jax.Array, wanted: jax.Array, *, config
     height, width = distance.shape
     cells = {(0, 0): _pixels(rgb, distance, wanted, config)}
     costs = {(0, 0): jnp.zeros(distance.shape)}
-    for level in _levels(height, width, config.max_leaf_side)[1:]:
+    for level in levels_of(height, width, config.max_leaf_side)[1:]:
         below = (level[0], level[1] - 1) if level[1] else (level[0] - 1, 0)
         cells[level], costs[level] = _level(cells[below], level, config)
     return costs
@@ -57,7 +57,8 @@ def largest_side(pixels: int, largest: int) -> int:
     return max(1 << k for k in range(most.bit_length()) if pixels % (1 << k) == 0)
 
 
-def _levels(height: int, width: int, largest: int) -> list[Level]:
+def levels_of(height: int, width: int, largest: int) -> list[Level]:
+    """Rectangles that may become one Gaussian, smallest first."""
     most = [largest_side(side, largest).bit_length() - 1 for side in (height, width)]
     return [(j, k) for j in range(most[0] + 1) for k in range(most[1] + 1)]
 

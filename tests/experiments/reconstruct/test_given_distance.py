@@ -77,3 +77,9 @@ def test_what_is_no_distance_is_refused_in_one_line(told, truth, values, setting
 def test_a_word_that_is_no_kind_is_refused():
     with pytest.raises(InputError, match="distance_kind must be one of distance, z, disparity, relative"):
         InputConfig(distance_kind="inverse")
+
+
+@pytest.mark.parametrize(("picture", "rows"), [(2048, 512), (512, 512), (500, 480), (96, 96), (40, 64)])
+def test_a_picture_smaller_than_asked_keeps_its_own_rows(picture, rows):
+    """In steps of 32, and 64 at least."""
+    assert InputConfig(height=512).rows(picture) == rows
