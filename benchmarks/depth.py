@@ -101,10 +101,14 @@ def _measure(options: argparse.Namespace) -> None:
         for method in methods:
             mean, error, _ = over_rooms(jnp.array([row[method] for row in rows.values()]))
             print(f"MEAN of {len(rows)} {kind}: {method} {_told(mean)}\n  +- {_told(error)}", flush=True)
-        told[kind] = {name: {m: dict(zip(FIGURES, map(float, r), strict=True)) for m, r in row.items()}
-                      for name, row in rows.items()}  # fmt: skip
+        told[kind] = {name: {m: _in_json(r) for m, r in row.items()} for name, row in rows.items()}
     if options.json:
         write_text(options.json, json.dumps(told, indent=1) + "\n")
+
+
+def _in_json(row: list[float]) -> dict[str, float | None]:
+    """JSON knows no NaN."""
+    return {figure: None if np.isnan(x) else float(x) for figure, x in zip(FIGURES, row, strict=True)}
 
 
 def _row(name: str, rgb: np.ndarray, true: np.ndarray, methods: dict, pictures: Path | None) -> dict[str, list[float]]:

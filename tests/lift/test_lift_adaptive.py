@@ -147,8 +147,7 @@ def test_what_is_selected_is_covered_and_nothing_else():
     splats = lift_adaptively(room, ORIGIN, select, config=replace(CONFIG, share=0.5))
     alpha = np.asarray(shown(splats).alpha)
     wanted = np.asarray(select & known)
-    # Beside the hole splats are narrow: sigma^2 of 0.75^2 / 2 pixels, with a filter of 0.1, leaves 0.99 * 0.28 / 0.38 of
-    # a pixel's own one.
+    # Beside the hole splats are narrow: of a sigma^2 of 0.75^2 / 2 pixels a filter of 0.1 leaves 0.99 * 0.28 / 0.38.
     assert alpha[wanted].min() > 0.73
     assert alpha[12:20, 26:35].max() < 0.01  # five pixels inside the hole
     assert all(np.isfinite(x).all() for x in jax.tree.leaves(splats))

@@ -85,7 +85,7 @@ def test_a_pinhole_footprint_is_the_spread_of_pixels() -> None:
     splats = run(gaussians, camera, config=RasterizeConfig(antialias=False))
     points = sampled_points(gaussians, camera.world_from_camera)
     pixels = jnp.stack(pixels_from_points(points, camera.focal, camera.centre), axis=-1)
-    close_to(unfiltered(splats, 0.3), second_moments(pixels, np.asarray(splats.mean)))
+    close_to(unfiltered(splats, RasterizeConfig.filter_variance), second_moments(pixels, np.asarray(splats.mean)))
 
 
 def test_offsets_move_projected_means_by_pixels_and_nothing_else() -> None:
