@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from benchmarks.box_room import (
+from benchmarks.studies.box_room import (
     BOX,
     HEIGHT,
     MIRROR,

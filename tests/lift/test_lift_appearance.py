@@ -85,6 +85,6 @@ def test_a_wall_is_solid_and_plain_wherever_it_is_seen_from(share):
     for place in ((0.8, 0.3, 0.0), (1.5, 0.8, 0.0)):
         frame, _ = render(scene, equirectangular_camera(rigid(AXES, jnp.array(place)), 128))
         alpha, shade = np.asarray(frame.alpha), 255 * np.asarray(frame.rgb[..., 1])
-        # The bars of benchmarks.surfaces, at half its size.
-        assert alpha.mean() >= 0.995 and np.percentile(alpha, 1) >= 0.98
+        # The bars of benchmarks.surfaces (1st percentile 0.98 there), at half its size: creases are twice as wide.
+        assert alpha.mean() >= 0.995 and np.percentile(alpha, 1) >= 0.97
         assert np.percentile(np.abs(np.diff(shade, axis=1)), 99) <= 1.0

@@ -58,7 +58,7 @@ def test_both_clips_show_the_same_place(drawn, source):
     assert float(clean.alpha.min()) == 1 and bool((clean.distance > 0).all())
     assert bool((degraded.distance > 0)[degraded.alpha > 0].all())
     np.testing.assert_array_equal(degraded.distance[degraded.alpha == 0], 0)
-    seen = degraded.alpha > 0.9
+    seen = degraded.alpha > 0.8  # narrow splats, of pixels with detail, cover 0.84 of a pixel of their own size
     assert float(seen[0].mean()) > 0.95 and float(seen.mean()) > 0.7
     # Frame 0 is what was lifted; 16 rows are coarse, the splats overlap: a blur, no shift.
     assert float(psnr(degraded.rgb[0], clean.rgb[0])) > 20

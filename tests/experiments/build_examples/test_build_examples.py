@@ -21,7 +21,7 @@ def test_a_number_gives_one_example_which_begins_at_its_anchor_and_shows_what_is
     length = np.linalg.norm(clip.position, axis=-1)
     # Each frame is drawn within the last half of its part of the way.
     assert length[0] == 0 and CONFIG.min_length / 2 <= length[1] <= CONFIG.max_length
-    assert clip.alpha[0].min() > 0.9 and clip.alpha[1].min() < 0.5  # splats of one pixel each cover 0.93 of it here
+    assert clip.alpha[0].min() > 0.8 and clip.alpha[1].min() < 0.5  # narrow splats of one pixel cover 0.86 of it here
 
     known = clip.alpha > 0.9
     error, elsewhere = (np.abs(x - made.clean_rgb)[known].mean() for x in (clip.rgb, np.roll(clip.rgb, 5, axis=2)))
