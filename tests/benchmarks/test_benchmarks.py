@@ -15,7 +15,8 @@ from experiments.command_list import commands, run_listed
 from rein3d_jax.rasterize.reference import rasterize_reference
 
 ROOT = Path(__file__).resolve().parents[2]
-PARTS = {"__init__", "__main__", "array_pickle", "workloads", "studies.box_room"}  # what benchmarks are made of
+# What benchmarks are made of.
+PARTS = {"__init__", "__main__", "array_pickle", "workloads", "studies.__init__", "studies.box_room"}
 SMALL = Size(40, 0.3, 24, 16)
 
 
