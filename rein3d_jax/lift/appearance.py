@@ -19,7 +19,7 @@ _RADIUS = 2  # pixels: of the windows
 
 
 def splat_overlap(rgb: jax.Array, apart: jax.Array, *, detailed: float, plain: float) -> jax.Array:
-    """Half the diagonal of a pixel in sigmas (h, w): `plain` where the picture (h, w, 3) has no detail, `detailed`
+    """Sigma over half a pixel's diagonal (h, w): `plain` where the picture (h, w, 3) has no detail, `detailed`
     where it has, and near what is `apart` (h, w) bool, where a wide splat would stand out into the open."""
     detail = rgb - window_sum(rgb, 1) / 9
     power = window_sum(jnp.sum(detail**2, axis=-1), _RADIUS) / (2 * _RADIUS + 1) ** 2

@@ -21,7 +21,7 @@ class Traits:
     """What splats need to know of a surface besides its place; over a patch, the mean."""
 
     slope: jax.Array  # (..., 2) `surface.slopes`, limited
-    overlap: jax.Array  # (...) half the diagonal of a pixel, in sigmas
+    overlap: jax.Array  # (...) sigma over half a pixel's diagonal
     rgb: jax.Array  # (..., 3) sRGB, made up for what splats blur
 
 

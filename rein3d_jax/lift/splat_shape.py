@@ -19,8 +19,8 @@ def splat_shape(
     """Axes (n, 3, 3) as columns, in the panorama's own frame, and their sigmas (n, 3) in metres, of splats at `middle`
     (n, 3) metres on a surface of `slope` (n, 2), each for `sides` (n, 2) rows and columns of `pitch` radians a row.
 
-    Seen from the origin sigma is `overlap` (n,) times half the side over sqrt(1/2): a pixel's corner, and a
-    rectangle's, is then as many sigmas away. On the surface the axes of `surface` are stretched by
+    Seen from the origin sigma is `overlap` (n,) times a side over sqrt(2), half the diagonal of a square: a rectangle's
+    corner is as many sigmas away as a pixel's. On the surface the axes of `surface` are stretched by
     sqrt(1 + tangent^2) along the first, and the ellipse's own axes follow; across it lies `thickness` of the smaller.
     """
     away = safe_norm(middle)
