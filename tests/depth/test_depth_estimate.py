@@ -7,7 +7,6 @@ import pytest
 
 from rein3d_jax.depth.estimate import estimate_distance
 from rein3d_jax.depth.network.config import DepthNetworkConfig
-from rein3d_jax.depth.network.network import initial_depth_parameters
 from rein3d_jax.depth.room_shell import RoomShellConfig
 from rein3d_jax.geometry.shell import RoomShell, meet_shell
 from rein3d_jax.geometry.sphere import pixel_rays
@@ -20,8 +19,8 @@ pytestmark = pytest.mark.slow  # the shell's search compiles for some seconds
 
 
 @pytest.fixture(scope="module")
-def estimate():
-    parameters = initial_depth_parameters(jax.random.key(0), TINY)
+def estimate(random_network):
+    parameters = random_network(TINY)
     return lambda rgb, height=1.0: estimate_distance(rgb, parameters, height, config=TINY)
 
 
@@ -31,8 +30,14 @@ def room():
     return jax.random.uniform(jax.random.key(1), (6, 3))[face]
 
 
-def test_it_is_finite_positive_and_the_same_twice(estimate):
-    first, second = estimate(room()), estimate(room())
+@pytest.fixture(scope="module")
+def first(estimate):
+    """The estimate of the room, which four tests compare others with."""
+    return estimate(room())
+
+
+def test_it_is_finite_positive_and_the_same_twice(estimate, first):
+    second = estimate(room())
     for leaf, again in zip(jax.tree.leaves(first), jax.tree.leaves(second), strict=True):
         assert np.isfinite(leaf).all()
         np.testing.assert_array_equal(leaf, again)
@@ -40,22 +45,20 @@ def test_it_is_finite_positive_and_the_same_twice(estimate):
 
 
 @pytest.mark.parametrize("eighths", [1, 3, 6])
-def test_a_yaw_by_eighths_of_a_circle_yaws_the_estimate(estimate, eighths):
+def test_a_yaw_by_eighths_of_a_circle_yaws_the_estimate(estimate, first, eighths):
     columns = eighths * W // 8
     turned = estimate(jnp.roll(room(), columns, axis=1)).distance
     # The very same picture is estimated: only a tie between two brightest eighths could turn it otherwise.
-    np.testing.assert_array_equal(turned, jnp.roll(estimate(room()).distance, columns, axis=1))
+    np.testing.assert_array_equal(turned, jnp.roll(first.distance, columns, axis=1))
 
 
-def test_metres_follow_the_camera_s_height(estimate):
-    np.testing.assert_allclose(estimate(room(), 2.5).distance, 2.5 * estimate(room()).distance, rtol=1e-6)
+def test_metres_follow_the_camera_s_height(estimate, first):
+    np.testing.assert_allclose(estimate(room(), 2.5).distance, 2.5 * first.distance, rtol=1e-6)
 
 
-@pytest.mark.parametrize("platform", ["cuda", "tpu"])
-def test_it_exports_for_accelerators(platform):
-    shapes = jax.eval_shape(lambda: initial_depth_parameters(jax.random.key(0), TINY))
+def test_it_exports_for_accelerators(depth_shapes):
     rgb = jax.ShapeDtypeStruct((256, 512, 3), jnp.float32)
     whole = jax.jit(
         lambda rgb, parameters: estimate_distance(rgb, parameters, 1.6, config=TINY, shell=RoomShellConfig())
     )
-    assert jax.export.export(whole, platforms=[platform])(rgb, shapes).mlir_module_serialized
+    assert jax.export.export(whole, platforms=["cuda", "tpu"])(rgb, depth_shapes(TINY)).mlir_module_serialized

@@ -1,5 +1,6 @@
 """The distance network that comes with the package."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -13,7 +14,8 @@ from rein3d_jax.networks.depth import SHIPPED_DEPTH, read_depth_network
 def test_it_knows_where_the_floor_of_a_photograph_is():
     """Straight below, the distance is the camera's height; the ceiling is at most a few of them away."""
     rgb, _, _ = resize_panorama(read_rgb(SAMPLES / "hotel_room.jpg"), None, None, 128)
-    log = estimate_depth(read_depth_network(), jnp.asarray(rgb)[None], DepthNetworkConfig()).log_distance[0]
+    estimate = jax.jit(estimate_depth, static_argnums=2)
+    log = estimate(read_depth_network(), jnp.asarray(rgb)[None], DepthNetworkConfig()).log_distance[0]
     assert jnp.isfinite(log).all()
     assert np.abs(np.asarray(log[-4:])).max() < 0.15  # a network's estimate
     assert -1.5 < float(log[:4].mean()) < 1.1

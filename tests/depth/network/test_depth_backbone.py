@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from rein3d_jax.depth.network.backbone import Backbone
 from rein3d_jax.depth.network.config import KERNELS, STRIDES, DepthNetworkConfig
@@ -43,24 +44,28 @@ def plain(parameters, rgb):
     return grid
 
 
-def test_it_is_the_plain_one():
+@pytest.fixture(scope="module")
+def parameters():
+    rgb = jnp.zeros((1, 32, 64, 3))
+    return jax.jit(lambda key: Backbone(CONFIG).init(key, rgb)["params"])(jax.random.key(1))
+
+
+def test_it_is_the_plain_one(parameters):
     rgb = jax.random.uniform(jax.random.key(0), (1, 64, 128, 3))
-    parameters = Backbone(CONFIG).init(jax.random.key(1), rgb)["params"]
-    parameters = jax.tree.map(lambda x: x + 0.1, parameters)  # biases that are not 0
-    features = Backbone(CONFIG).apply({"params": parameters}, rgb)
+    parameters = jax.tree.map(lambda x: np.asarray(x) + np.float32(0.1), parameters)  # biases that are not 0
+    features = jax.jit(lambda parameters, rgb: Backbone(CONFIG).apply({"params": parameters}, rgb))(parameters, rgb)
     assert [x.shape[1] for x in features] == [32, 16, 8, 4, 2]
-    expected = plain(parameters, rgb)
+    expected = jax.jit(plain)(parameters, rgb)
     np.testing.assert_allclose(features[-1], expected, atol=1e-4 * float(jnp.abs(expected).max()))
 
 
-def test_no_gradient_reaches_what_is_frozen():
+def test_no_gradient_reaches_what_is_frozen(parameters):
     rgb = jax.random.uniform(jax.random.key(0), (1, 32, 64, 3))
-    parameters = Backbone(CONFIG).init(jax.random.key(1), rgb)["params"]
 
     def loss(parameters):
         return sum(jnp.sum(x**2) for x in Backbone(CONFIG, frozen=2).apply({"params": parameters}, rgb))
 
-    slopes = jax.grad(loss)(parameters)
+    slopes = jax.jit(jax.grad(loss))(parameters)
     still = {name for name, slope in slopes.items() if not any(x.any() for x in jax.tree.leaves(slope))}
     assert still == {"stem", "block00", "block01", "block02"}
     assert not any(slopes[name]["depthwise"]["kernel"].any() for name in slopes if name != "stem")

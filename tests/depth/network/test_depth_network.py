@@ -7,7 +7,7 @@ import pytest
 
 from rein3d_jax.depth.network.config import DepthNetworkConfig
 from rein3d_jax.depth.network.horizon import background_inverse, bands_of, to_columns
-from rein3d_jax.depth.network.network import estimate_depth, initial_depth_parameters
+from rein3d_jax.depth.network.network import estimate_depth
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.shell import RoomShell, meet_shell
 from rein3d_jax.geometry.sphere import azimuths, pixel_rays
@@ -18,11 +18,9 @@ TINY = DepthNetworkConfig(
 
 
 @pytest.fixture(scope="module")
-def network():
-    parameters = initial_depth_parameters(jax.random.key(0), TINY)
-    noise = jax.random.normal(jax.random.key(1), (64,))  # so that no leaf is the zero that it starts from
-    parameters = jax.tree.map(lambda x: x + 0.1 * jnp.resize(noise, x.shape), parameters)
-    return parameters, jax.jit(lambda rgb: estimate_depth(parameters, rgb, TINY))
+def estimate(random_network):
+    parameters = random_network(TINY)
+    return jax.jit(lambda rgb: estimate_depth(parameters, rgb, TINY))
 
 
 def picture(rows, seed=0):
@@ -30,8 +28,8 @@ def picture(rows, seed=0):
 
 
 @pytest.mark.parametrize("rows", [32, 96])
-def test_every_output_has_the_pictures_shape_and_is_finite(network, rows):
-    predicted = network[1](picture(rows))
+def test_every_output_has_the_pictures_shape_and_is_finite(estimate, rows):
+    predicted = estimate(picture(rows))
     for leaf in jax.tree.leaves(predicted):
         assert leaf.shape == (2, rows, 2 * rows)
         assert jnp.isfinite(leaf).all()
@@ -39,32 +37,30 @@ def test_every_output_has_the_pictures_shape_and_is_finite(network, rows):
 
 
 @pytest.mark.parametrize("strides", [1, 3])
-def test_a_yaw_by_whole_strides_yaws_the_estimate(network, strides):
-    rgb, estimate = picture(64), network[1]
+def test_a_yaw_by_whole_strides_yaws_the_estimate(estimate, strides):
+    rgb = picture(96)
     moved = estimate(jnp.roll(rgb, 32 * strides, axis=2))
     for before, after in zip(jax.tree.leaves(estimate(rgb)), jax.tree.leaves(moved), strict=True):
         # float32, sums over the columns in another order
         np.testing.assert_allclose(after, jnp.roll(before, 32 * strides, axis=2), atol=1e-4)
 
 
-@pytest.mark.parametrize("platform", ["cuda", "tpu"])
-def test_it_exports_for_accelerators(platform):
-    shapes = jax.eval_shape(lambda: initial_depth_parameters(jax.random.key(0), DepthNetworkConfig()))
+def test_it_exports_for_accelerators(depth_shapes):
+    shapes = depth_shapes(DepthNetworkConfig())
     rgb = jax.ShapeDtypeStruct((1, 128, 256, 3), jnp.float32)
     estimate = jax.jit(lambda parameters, rgb: estimate_depth(parameters, rgb, DepthNetworkConfig()))
-    assert jax.export.export(estimate, platforms=[platform])(shapes, rgb).mlir_module_serialized
+    assert jax.export.export(estimate, platforms=["cuda", "tpu"])(shapes, rgb).mlir_module_serialized
 
 
-def test_the_shipped_sizes_stay_small():
-    shapes = jax.eval_shape(lambda: initial_depth_parameters(jax.random.key(0), DepthNetworkConfig()))
-    assert 2 * sum(leaf.size for leaf in jax.tree.leaves(shapes)) < 20e6  # bytes as float16
+def test_the_shipped_sizes_stay_small(depth_shapes):
+    assert 2 * sum(leaf.size for leaf in jax.tree.leaves(depth_shapes(DepthNetworkConfig()))) < 20e6  # bytes as float16
 
 
 def test_the_background_of_a_box_is_its_distance():
     shell = RoomShell(jnp.float32(0.0), jnp.array([2.0, 1.5, 3.0, 1.2]), jnp.float32(1.0), jnp.float32(0.8))
     flat = jnp.stack([jnp.cos(azimuths(64)), -jnp.sin(azimuths(64)), jnp.zeros(64)], axis=-1)
     walls = 1 / meet_shell(shell, jnp.zeros(3), flat)[0]
-    inverse = background_inverse(walls[None], jnp.full((1, 64), 1 / 0.8), 32)[0]
+    inverse = jax.jit(background_inverse, static_argnums=2)(walls[None], jnp.full((1, 64), 1 / 0.8), 32)[0]
     np.testing.assert_allclose(1 / inverse, meet_shell(shell, jnp.zeros(3), pixel_rays(32, 64))[0], rtol=1e-4)
 
 

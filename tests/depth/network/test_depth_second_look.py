@@ -32,10 +32,13 @@ def test_strips_show_the_latitudes_around_a_line():
     np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), atol=1e-5)
 
 
-def test_it_changes_nothing_before_it_has_learned():
+def test_it_changes_nothing_before_it_has_learned(random_network):
+    """Whatever the rest of the network has learned."""
     with_look = DepthNetworkConfig(**SIZES, decoder=(8,) * 5, looks=2)
     without = DepthNetworkConfig(**SIZES, decoder=(8,) * 5, looks=0)
-    parameters = initial_depth_parameters(jax.random.key(0), with_look)
+    unlearned = jax.jit(lambda key: initial_depth_parameters(key, with_look)["look"])(jax.random.key(0))
+    parameters = {**random_network(with_look), "look": unlearned}
     rgb = jax.random.uniform(jax.random.key(1), (1, 32, 64, 3))
-    both = [estimate_depth(parameters, rgb, config).log_distance for config in (with_look, without)]
+    estimate = jax.jit(estimate_depth, static_argnums=2)
+    both = [estimate(parameters, rgb, config).log_distance for config in (with_look, without)]
     np.testing.assert_allclose(*both, atol=1e-5)  # tangents and their inverses in float32
