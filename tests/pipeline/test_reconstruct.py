@@ -9,7 +9,7 @@ import pytest
 
 import rein3d_jax as r3d
 from rein3d_jax.depth.estimate import DepthConfig
-from rein3d_jax.depth.network.network import initial_depth_parameters
+from rein3d_jax.depth.room_shell import RoomShellConfig
 from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.pipeline.survey import room_background
 from rein3d_jax.restore import restorer
@@ -19,6 +19,7 @@ pytestmark = pytest.mark.slow  # the whole pipeline
 HALF = jnp.array([2.0, 1.6, 1.3])  # metres: half sizes of the room
 HEIGHT, KEY = 64, jax.random.key(0)
 STAGES = r3d.Stages(
+    shell=RoomShellConfig(climbers=32, rounds=4),
     explore=r3d.explore.ExploreConfig(trajectories=2, step=0.5),
     restore=r3d.restore.RestoreConfig(height=HEIGHT),
     refine=r3d.refine.RefineConfig(
@@ -38,6 +39,34 @@ def panorama() -> r3d.Panorama:
 @pytest.fixture(scope="module")
 def result(panorama) -> r3d.Reconstruction:
     return r3d.reconstruct(panorama, KEY, stages=STAGES)
+
+
+@pytest.fixture(scope="module")
+def explore(panorama):
+    """(start=state) -> the states after each path from there: the generators, as a caller who watches them would."""
+    known = r3d.survey(panorama, STAGES)
+    fill = restorer(STAGES.restore, room_background(panorama, STAGES.restore), None)
+    key = jax.random.fold_in(KEY, 0)
+    return lambda **start: list(r3d.explore_and_restore(known, fill, key, stages=STAGES, **start))
+
+
+@pytest.fixture(scope="module")
+def explored(explore) -> list:
+    return explore()
+
+
+@pytest.fixture(scope="module")
+def refined(panorama, explored):
+    """stages -> the last snapshot of refining what was explored."""
+    start, key = explored[-1].scene, jax.random.fold_in(KEY, 1)
+    views = r3d.collect_views(panorama, [state.video for state in explored], stages=STAGES)
+
+    def last(stages):
+        for snapshot in r3d.refine_scene(start, views, panorama, key, stages=stages):
+            assert snapshot.step <= stages.refine.steps
+        return snapshot
+
+    return last
 
 
 def same_bytes(one, other) -> bool:
@@ -60,22 +89,15 @@ def test_what_is_known_everywhere_stays_as_it_is(panorama, result) -> None:
     np.testing.assert_array_equal(result.panorama.distance, panorama.distance)
 
 
-def test_it_repeats_to_the_byte_and_its_stages_joined_by_hand_give_the_same(panorama, result) -> None:
-    """The generators, one after another, as a caller who watches them would."""
-    known = r3d.survey(panorama, STAGES)
-    fill = restorer(STAGES.restore, room_background(panorama, STAGES.restore), None)
-    states = list(r3d.explore_and_restore(known, fill, jax.random.fold_in(KEY, 0), stages=STAGES))
-    (again,) = r3d.explore_and_restore(known, fill, jax.random.fold_in(KEY, 0), stages=STAGES, start=states[0])
-    assert same_bytes(again, states[1])  # on from a saved state
-    views = r3d.collect_views(panorama, [state.video for state in states], stages=STAGES)
-    for last in r3d.refine_scene(states[-1].scene, views, panorama, jax.random.fold_in(KEY, 1), stages=STAGES):
-        assert last.step <= STAGES.refine.steps
-    assert same_bytes(last.scene, result.scene)
+def test_it_repeats_to_the_byte_and_its_stages_joined_by_hand_give_the_same(explore, explored, refined, result) -> None:
+    (again,) = explore(start=explored[0])
+    assert same_bytes(again, explored[1])  # on from a saved state
+    assert same_bytes(refined(STAGES).scene, result.scene)
 
 
-def test_a_limit_on_the_count_holds(panorama) -> None:
+def test_a_limit_on_the_count_holds(refined) -> None:
     small = dataclasses.replace(STAGES, refine=dataclasses.replace(STAGES.refine, max_count=1000, steps=1))
-    assert int(r3d.reconstruct(panorama, KEY, stages=small).scene.alive.sum()) == 1000
+    assert int(refined(small).scene.alive.sum()) == 1000
 
 
 def test_without_a_known_distance_a_box_is_fitted(panorama) -> None:
@@ -86,9 +108,9 @@ def test_without_a_known_distance_a_box_is_fitted(panorama) -> None:
 
 
 def test_a_network_s_estimate_is_metres_by_the_camera_s_height(panorama) -> None:
-    """An untrained network will do: twice the height, twice all distances."""
+    """Twice the height, twice all distances."""
     stages = dataclasses.replace(STAGES, depth=DepthConfig(method="network"))
-    unknown, network = panorama.replace(valid=jnp.zeros_like(panorama.valid)), initial_depth_parameters(KEY)
+    unknown, network = panorama.replace(valid=jnp.zeros_like(panorama.valid)), r3d.read_depth_network()
     low, high = (r3d.with_distance(unknown, stages, network, camera_height=height)[0] for height in (1.2, 2.4))
     assert bool(jnp.isfinite(low.distance).all()) and float(low.distance.min()) > 0
     np.testing.assert_allclose(high.distance, 2 * low.distance, rtol=1e-5)  # float32

@@ -123,7 +123,8 @@ def test_open_windows_have_a_colour_and_no_distance(many_rooms, room_of, tracer,
 def test_the_share_of_open_windows_is_the_config_s():
     keys = jax.random.split(jax.random.key(3), 64)
     for share in (0.0, 0.5, 1.0):
-        drawn = jax.vmap(lambda key, share=share: generate_room(key, RoomConfig(open_windows=share)).open_windows)(keys)
+        config = RoomConfig(open_windows=share)
+        drawn = jax.jit(jax.vmap(lambda key, config=config: generate_room(key, config).open_windows))(keys)
         assert abs(float(drawn.mean()) - share) < 0.2  # 3 standard deviations of 64 draws
 
 
