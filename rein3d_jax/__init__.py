@@ -9,8 +9,8 @@
     frame, _ = r3d.render(result.scene, camera, config=r3d.Stages().rasterize)
     r3d.write_splats("room.ply", result.scene)
 
-A stage is a package of its own, by name: r3d.depth, r3d.lift, r3d.explore, r3d.rasterize, r3d.restore, r3d.refine,
-r3d.evaluate. What is named here is imported when it is first asked for.
+A stage is a package of its own, by name: r3d.depth, r3d.lift, r3d.explore, r3d.rasterize, r3d.restore, r3d.upsample,
+r3d.refine, r3d.evaluate. What is named here is imported when it is first asked for.
 """
 
 import importlib
@@ -26,6 +26,7 @@ _DOORS = {
     "read_panorama": "io.pictures.panorama",
     "read_network": "networks.trained",
     "read_depth_network": "networks.depth",
+    "read_upsampler": "networks.upsampler",
     **dict.fromkeys(("read_splats", "write_splats"), "io.splats.gaussian_file"),
     **dict.fromkeys(("Decisions", "Reconstruction", "reconstruct"), "pipeline.reconstruct"),
     "Stages": "pipeline.stages",
@@ -33,7 +34,8 @@ _DOORS = {
     **dict.fromkeys(("Explored", "explore_and_restore"), "pipeline.explore_and_restore"),
     **dict.fromkeys(("collect_views", "refine_scene"), "pipeline.refine_scene"),
 }
-_ROOMS = ("conventions", "depth", "evaluate", "explore", "geometry", "lift", "rasterize", "refine", "restore", "rooms")
+_STAGES = ("depth", "lift", "explore", "rasterize", "restore", "upsample", "refine", "evaluate")
+_ROOMS = ("conventions", "geometry", "rooms", *_STAGES)
 
 __all__ = ["__version__", *_DOORS, *_ROOMS]
 

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 FILES = sorted(path for room in ("rein3d_jax", "experiments") for path in (ROOT / room).rglob("*.py"))
-STAGES = {"depth", "lift", "explore", "rasterize", "restore", "refine", "evaluate", "rooms"}
+STAGES = {"depth", "lift", "explore", "rasterize", "restore", "upsample", "refine", "evaluate", "rooms"}
 GROUND = {"", "conventions", "errors", "settings"}  # "" is the package itself: its version
 MAX_LINES = 250
 NAMELESS = {"utils", "util", "helpers", "helper", "common", "misc"}
@@ -28,7 +28,7 @@ MAY_IMPORT = {
     "meshes": {"scene", "geometry"},
     "io": {"scene", "geometry", "meshes"},
     "parallel": {"scene"},
-    "networks": {"io", "depth", "restore"},
+    "networks": {"io", "depth", "restore", "upsample"},
     "pipeline": {"scene", "geometry", "parallel", *STAGES},
     "report": {"scene", "geometry", "evaluate"},
     "experiments": {"scene", "geometry", "meshes", "io", "networks", "parallel", "pipeline", "report", *STAGES},
@@ -39,7 +39,7 @@ HOMES = {
     "jax": ("rein3d_jax/", "experiments/"),
     "numpy": ("rein3d_jax/", "experiments/"),
     "flax.struct": ("rein3d_jax/", "experiments/"),
-    "flax.linen": ("rein3d_jax/depth/", "rein3d_jax/restore/"),
+    "flax.linen": ("rein3d_jax/depth/", "rein3d_jax/restore/", "rein3d_jax/upsample/"),
     "optax": ("rein3d_jax/refine/", "experiments/"),
     "jaxopt": ("rein3d_jax/depth/",),
     "cv2": ("rein3d_jax/io/", "rein3d_jax/meshes/", "rein3d_jax/restore/fills.py"),

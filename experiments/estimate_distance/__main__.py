@@ -15,6 +15,7 @@ import sys
 import time
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 
 from experiments.command import CommandParser
@@ -25,11 +26,13 @@ from rein3d_jax.depth.level import LEANED, levelled
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.pictures.distance import write_distance_exr
-from rein3d_jax.io.pictures.image import panorama_rows, resize_distance, write_rgb
+from rein3d_jax.io.pictures.image import panorama_rows, write_rgb
 from rein3d_jax.io.pictures.panorama import read_panorama
 from rein3d_jax.networks.depth import read_depth_network
+from rein3d_jax.networks.upsampler import read_upsampler
 from rein3d_jax.pipeline.survey import with_distance
 from rein3d_jax.report.colour_map import colour_map, colour_range
+from rein3d_jax.upsample import distance_for
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -49,19 +52,20 @@ def _estimate(options: argparse.Namespace) -> None:
     if output.resolve() == Path(options.input).resolve():
         raise InputError(f"--output {output} is the picture itself: choose another name")
     given = [f"input.panorama={json.dumps(options.input)}", "input.distance=none", "input.views=none"]
+    given.append("input.upsample=none")  # its guessed detail says nothing of distance
     config = load_config(ReconstructConfig, options.config, given + options.set)
     rows = panorama_rows(resolve(config.input.panorama))  # a picture that is none is refused before the long part
-    panorama, told, lean = told_panorama(config.input)
+    panorama, told, lean = told_panorama(config.input, read_upsampler(config.input.upsample))
     network = read_depth_network() if config.asks_network else None
     placed, estimated = with_distance(panorama, config, network, camera_height=config.input.eye_height)
-    distance = resize_distance(np.where(placed.valid, placed.distance, np.float32(0)), rows)
+    picture = levelled(read_panorama(resolve(config.input.panorama)), lean).rgb
+    distance = np.asarray(distance_for(picture, jnp.where(placed.valid, placed.distance, 0.0)))
     write_distance_exr(output, distance)
     known = distance > 0
     write_rgb(
         output.with_name(f"{output.stem}_colours.png"), colour_map(distance, known, *colour_range(distance, known))
     )
     if lean.verdict == LEANED:
-        picture = levelled(read_panorama(resolve(config.input.panorama)), lean).rgb
         write_rgb(output.with_name(f"{output.stem}_level.png"), np.asarray(picture))
     facts = {
         "distance": str(output),

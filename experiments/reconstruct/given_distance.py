@@ -3,16 +3,16 @@ height where they have no unit. Whatever was done is told, and a map that no roo
 
 from pathlib import Path
 
+import jax
 import jax.numpy as jnp
-import numpy as np
 
 from rein3d_jax.depth.kinds import along_ray
 from rein3d_jax.depth.plausible import flattest_kind, implausible_size
 from rein3d_jax.depth.scale import height_above_floor
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.pictures.distance import read_distance
-from rein3d_jax.io.pictures.image import resize_panorama
 from rein3d_jax.scene import Panorama
+from rein3d_jax.upsample import distance_for
 
 _MEANS = {
     "z": "planar z of six cube faces",
@@ -21,16 +21,19 @@ _MEANS = {
 }
 
 
-def given_distance(rgb: np.ndarray, path: Path, kind: str, height: int) -> tuple[Panorama, str]:
-    """The panorama at `height` rows of a picture (h, 2 h, 3) and a file of numbers of a `kind`, distances along rays
-    (up to a factor, unless the kind is metric), and what was done to it, in words. Raises InputError for what
-    `read_distance` refuses, and for a map of the kind "distance" with the surfaces of another."""
+def given_distance(rgb: jax.Array, path: Path, kind: str) -> tuple[Panorama, str]:
+    """The panorama of a picture (h, 2 h, 3) and a file of numbers of a `kind`, distances along rays (up to a factor,
+    unless the kind is metric), and what was done to it, in words. Raises InputError for what `read_distance` refuses,
+    and for a map of the kind "distance" with the surfaces of another."""
     values, valid = read_distance(path, metres=kind == "distance")
     told = []
     if len(values) != len(rgb):
-        sizes = (f"{2 * len(x)}x{len(x)}" for x in (values, rgb))
-        told.append("the map is {}, the picture {}: each pixel took the nearest value".format(*sizes))
-    panorama = Panorama(*map(jnp.asarray, resize_panorama(rgb, values, valid, height)))
+        told.append("the map is {}x{}, brought to {}x{}".format(*values.shape[::-1], *rgb.shape[1::-1]))
+    if kind != "distance":
+        told.append(f"taken for {_MEANS[kind]}")
+    placed = along_ray(Panorama(rgb, values, valid), kind)
+    distance = distance_for(rgb, jnp.where(valid, jnp.asarray(placed.distance), 0.0))
+    panorama = Panorama(rgb, distance, distance > 0)
     if kind == "distance":
         found = flattest_kind(panorama, ("distance", "z", "disparity"))
         if found != kind:
@@ -38,9 +41,7 @@ def given_distance(rgb: np.ndarray, path: Path, kind: str, height: int) -> tuple
                 f"{path} is no distance along the ray: its surfaces are flat if it is {_MEANS[found]}; "
                 f"set input.distance_kind = {found}"
             )
-    else:
-        told.append(f"taken for {_MEANS[kind]}")
-    return along_ray(panorama, kind), "; ".join(told)
+    return panorama, "; ".join(told)
 
 
 def in_metres(panorama: Panorama, path: Path, camera_height: float | None) -> tuple[Panorama, str]:

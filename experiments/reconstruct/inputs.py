@@ -2,8 +2,10 @@
 
 import dataclasses
 import hashlib
+import math
 from pathlib import Path
 
+import jax
 import jax.numpy as jnp
 
 from experiments.reconstruct.given_distance import given_distance, in_metres
@@ -13,12 +15,13 @@ from rein3d_jax.depth.level import Lean, estimate_lean, levelled, unasked_lean
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.poses import rigid
 from rein3d_jax.io.files.input_file import require_file
-from rein3d_jax.io.pictures.image import panorama_rows, read_rgb
+from rein3d_jax.io.pictures.image import panorama_rows
 from rein3d_jax.io.pictures.panorama import read_panorama
 from rein3d_jax.io.rooms import traced_room
 from rein3d_jax.io.rooms.traced_room import View
 from rein3d_jax.scene import Panorama
 from rein3d_jax.settings import Settings, setting
+from rein3d_jax.upsample import BICUBIC, LEARNED, NONE, upsample_picture
 
 SAMPLES = Path(__file__).parents[1] / "samples"
 _STEP, _FEWEST = 32, 64  # rows to work at
@@ -38,6 +41,9 @@ class InputConfig(Settings):
         256,
         "rows to work at, a multiple of 32; a smaller picture keeps its own",
         within="[64, 4096]",
+    )
+    upsample: str = setting(
+        NONE, "doubles a smaller picture's rows, before all else, while height allows", among=(NONE, BICUBIC, LEARNED)
     )
     level: bool = setting(True, "a picture that leans is levelled before all else; false: it is taken as level")
     camera_height: float | None = setting(
@@ -60,8 +66,16 @@ class InputConfig(Settings):
             raise InputError(f"height must be a multiple of {_STEP}, not {self.height}")
 
     def rows(self, of_picture: int) -> int:
-        """Rows to work at for a picture of so many: no more than it has."""
+        """Rows to work at for a picture of so many: no more than it has, but for what upsampling adds."""
+        return self.own_rows(of_picture) << self.doublings(of_picture)
+
+    def own_rows(self, of_picture: int) -> int:
+        """Rows of the picture before it is upsampled."""
         return min(self.height, max(of_picture // _STEP * _STEP, _FEWEST))
+
+    def doublings(self, of_picture: int) -> int:
+        """How often it is upsampled."""
+        return 0 if self.upsample == NONE else int(math.log2(self.height / self.own_rows(of_picture)))
 
     @property
     def eye_height(self) -> float:
@@ -79,26 +93,36 @@ def resolve(path: str) -> Path:
     return SAMPLES / path.removeprefix("sample:") if path.startswith("sample:") else Path(path)
 
 
-def input_panorama(config: InputConfig) -> Panorama:
+def input_panorama(config: InputConfig, upsampler: dict | None = None) -> Panorama:
     """The panorama at the working height, level, distance in metres along the ray; where none is given, none is
-    valid."""
-    return told_panorama(config)[0]
+    valid. `upsampler` holds the network's parameters, where config.upsample is "learned"."""
+    return told_panorama(config, upsampler)[0]
 
 
-def told_panorama(config: InputConfig) -> tuple[Panorama, str, Lean]:
+def told_panorama(config: InputConfig, upsampler: dict | None = None) -> tuple[Panorama, str, Lean]:
     """The same; what was done to a given distance to make it metres along the ray, in words, "" for nothing; and how
     the picture leaned."""
     path = resolve(config.panorama)
     require_file(path)
+    rgb = _picture(path, config, upsampler)
     if config.distance is None:
-        panorama, lean = _levelled(read_panorama(path, height=config.rows(panorama_rows(path))), config)
+        unknown = jnp.zeros(rgb.shape[:2])
+        panorama, lean = _levelled(Panorama(rgb, unknown, unknown > 0), config)
         return panorama, "", lean
-    given, kind = resolve(config.distance), config.distance_kind
-    rgb = read_rgb(path)
-    panorama, converted = given_distance(rgb, given, kind, config.rows(len(rgb)))
+    given = resolve(config.distance)
+    panorama, converted = given_distance(rgb, given, config.distance_kind)
     panorama, lean = _levelled(panorama, config)  # a floor is looked for below
     panorama, scaled = in_metres(panorama, given, config.eye_height if config.scaled else None)
     return panorama, "; ".join(filter(None, (converted, scaled))), lean
+
+
+def _picture(path: Path, config: InputConfig, upsampler: dict | None) -> jax.Array:
+    """(h, 2 h, 3) at the rows to work at."""
+    rows = panorama_rows(path)
+    rgb = read_panorama(path, height=config.own_rows(rows)).rgb
+    for _ in range(config.doublings(rows)):
+        rgb = upsample_picture(rgb, config.upsample, upsampler)
+    return rgb
 
 
 def _levelled(panorama: Panorama, config: InputConfig) -> tuple[Panorama, Lean]:

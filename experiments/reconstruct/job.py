@@ -22,12 +22,14 @@ from rein3d_jax.explore.trajectories import radial_trajectories
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.networks.depth import SHIPPED_DEPTH, read_depth_network
 from rein3d_jax.networks.trained import files_digest, read_network, weights_fingerprint
+from rein3d_jax.networks.upsampler import read_upsampler, upsampler_fingerprint
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
 from rein3d_jax.pipeline.reconstruct import ALL_PATHS, Reconstruction, joined
 from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene
 from rein3d_jax.pipeline.survey import Survey, lift_scene, room_background, with_distance
 from rein3d_jax.refine import Snapshot, evaluate_held_out
 from rein3d_jax.restore import restorer
+from rein3d_jax.upsample import then_upsample
 
 PACKAGES = ("rein3d-jax", "jax", "jaxlib", "flax", "optax", "numpy", "opencv-contrib-python-headless", "OpenImageIO")
 
@@ -79,8 +81,16 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str, Lean]:
     config, key = job.config, jax.random.key(job.config.seed)
     weights = files_digest(SHIPPED_DEPTH) if config.asks_network else ""
     given = config.input
-    read = [given.height, given.level, given.eye_height, given.distance_kind, given.scale]
-    depends = [files, *read, job.settings("depth"), job.settings("shell"), weights, jax.__version__]
+    read = [given.height, given.level, given.eye_height, given.distance_kind, given.scale, given.upsample]
+    depends = [
+        files,
+        *read,
+        upsampler_fingerprint(given.upsample),
+        job.settings("depth"),
+        job.settings("shell"),
+        weights,
+        jax.__version__,
+    ]
     panorama, estimated, told, lean = job.stage("read", depends, lambda: _read(config))
     coarse = job.stage("lift", job.settings("lift"), lambda: lift_scene(panorama, config.lift))
     trajectories = job.stage(
@@ -97,7 +107,7 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str, Lean]:
 
 def _read(config: ReconstructConfig):
     network = read_depth_network() if config.asks_network else None
-    panorama, told, lean = told_panorama(config.input)
+    panorama, told, lean = told_panorama(config.input, read_upsampler(config.input.upsample))
     panorama, estimated = with_distance(panorama, config, network, camera_height=config.input.eye_height)
     return panorama, np.array([estimated]), told, lean
 
@@ -107,7 +117,10 @@ def _explored(job: _Job, known: Survey, key: jax.Array) -> Iterator[Explored]:
     config, last = job.config, None
     background = room_background(known.panorama, config.restore)
     restore = restorer(config.restore, background, read_network(config.restore))
-    shared = [job.settings("restore"), weights_fingerprint(config.restore), job.settings("rasterize"), config.seed]
+    method = config.upsample.method
+    restore = then_upsample(restore, known.panorama, read_upsampler(method), config=config.upsample)
+    settings = [job.settings(stage) for stage in ("restore", "upsample", "rasterize")]
+    shared = [*settings, weights_fingerprint(config.restore), upsampler_fingerprint(method), config.seed]
     for index in range(config.explore.trajectories):
         if index and job.clock.explored():
             return

@@ -40,7 +40,7 @@ class DepthTrainConfig(TrainConfig):
     model: str = setting("depth", "which network is trained", among=("depth",))
     output: str = setting("runs/depth", "folder of the run")
     batch: int = setting(8, "panoramas a step, over all devices", within="[1, inf)")
-    backbone: str = setting("", "folder of the pretrained backbone (benchmarks/convert_backbone.py); none: random")
+    backbone: str = setting("", "folder of the pretrained backbone (benchmarks/convert/backbone.py); none: random")
     weights: str = setting("", "folder of a trained network to go on from, in place of `backbone`")
     backbone_rate: float = setting(0.1, "the backbone's learning rate over the others'", within="[0, 1]")
     frozen: int = setting(2, "the backbone's first stages that stay as they are", within="[0, 7]")

@@ -27,7 +27,7 @@ class Fused:
 
 def fuse_guesses(start: Fused, degraded: Video, restored: Video, panorama: Panorama, stages: Stages) -> Fused:
     """Lift a restored video into what the scene leaves open, farthest frame first: it opens the largest holes, and the
-    nearer ones then see them closed. `degraded` is the video before restoring, `panorama` the input."""
+    nearer ones then see them closed. `degraded` is the video before restoring and upsampling, `panorama` the input."""
     scene, overflow, buffers, last = start.scene, start.overflow, start.buffers, restored.rgb.shape[0] - 1
     # Edges were snapped when the input was lifted; a guess has none to mend.
     config = dataclasses.replace(stages.lift, snap_edges=False)
@@ -36,7 +36,8 @@ def fuse_guesses(start: Fused, degraded: Video, restored: Video, panorama: Panor
     for index in range(last, 0, -stages.restore.fuse_every):
         camera = equirectangular_camera(restored.world_from_camera[index], restored.rgb.shape[1])
         alpha = degraded.alpha[index]
-        if index < last or not stages.restore.sequential:  # the scene has grown since the video was rendered
+        grown = index < last or not stages.restore.sequential  # the scene has, since the video was rendered
+        if grown or alpha.shape != restored.alpha.shape[1:]:
             frame, buffers = render(scene, camera, config=stages.rasterize, buffers=buffers)
             alpha = frame.alpha
         guess = _guess(restored, index, panorama)

@@ -14,6 +14,7 @@ from rein3d_jax.pipeline.survey import Survey, room_background, survey, with_dis
 from rein3d_jax.refine import Curves
 from rein3d_jax.restore import TrainedNetwork, restorer
 from rein3d_jax.scene import Gaussians, Panorama, Video
+from rein3d_jax.upsample import then_upsample
 
 ALL_PATHS = "all paths taken"
 
@@ -47,18 +48,21 @@ def reconstruct(
     *,
     stages: Stages = Stages(),
     network: TrainedNetwork | None = None,
+    upsampler: dict | None = None,
     camera_height: float = EYE_HEIGHT,
 ) -> Reconstruction:
     """The scene of a panorama (h, 2 h): lifted, explored, restored and refined (paper Sec. 3).
 
     Distances that are not `valid` are completed. Where none is, `with_distance` estimates them beforehand; with
     stages.depth.method "shell" an empty box is fitted here, for a camera `camera_height` metres above the floor.
-    `network` is the trained restorer, where stages.restore names one. Runs outside jit; every stage in it is compiled.
+    `network` is the trained restorer, where stages.restore names one, `upsampler` the parameters of the network where
+    stages.upsample names it. Runs outside jit; every stage in it is compiled.
     The same key gives the same bytes.
     """
     panorama, _ = with_distance(panorama, stages, camera_height=camera_height)
     known = survey(panorama, stages)
     restore = restorer(stages.restore, room_background(panorama, stages.restore), network)
+    restore = then_upsample(restore, panorama, upsampler, config=stages.upsample)
     explore_key, refine_key = (jax.random.fold_in(key, i) for i in range(2))
     explored = list(explore_and_restore(known, restore, explore_key, stages=stages))
     views = collect_views(panorama, [state.video for state in explored], stages=stages)

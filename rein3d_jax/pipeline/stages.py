@@ -16,6 +16,7 @@ from rein3d_jax.refine import RefineConfig
 from rein3d_jax.restore import RestoreConfig
 from rein3d_jax.scene import Gaussians, Video
 from rein3d_jax.settings import Settings
+from rein3d_jax.upsample import UpsampleConfig
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class Stages(Settings):
     explore: ExploreConfig = ExploreConfig()
     rasterize: RasterizeConfig = RasterizeConfig()
     restore: RestoreConfig = RestoreConfig()
+    upsample: UpsampleConfig = UpsampleConfig()
     refine: RefineConfig = RefineConfig()
 
 

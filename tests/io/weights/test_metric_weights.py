@@ -43,7 +43,7 @@ def test_other_arrays_are_refused(tmp_path):
 
 
 def test_i3d_says_how_to_make_its_file(tmp_path):
-    with pytest.raises(InputError, match=r"i3d\.npz cannot be read.*convert_weights i3d"):
+    with pytest.raises(InputError, match=r"i3d\.npz cannot be read.*convert.metrics i3d"):
         i3d_weights(tmp_path / "i3d.npz")
-    with pytest.raises(InputError, match=r"does not hold.*convert_weights i3d"):
+    with pytest.raises(InputError, match=r"does not hold.*convert.metrics i3d"):
         i3d_weights(METRIC_WEIGHTS / "niqe.npz")

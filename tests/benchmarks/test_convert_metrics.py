@@ -6,8 +6,8 @@ import pickle
 import numpy as np
 import pytest
 
-from benchmarks import convert_weights
-from benchmarks.array_pickle import load_arrays
+from benchmarks.convert import metrics
+from benchmarks.convert.array_pickle import load_arrays
 
 
 def test_arrays_come_back():
@@ -34,7 +34,7 @@ def test_another_archive_is_refused(tmp_path, capsys, data):
     archive = tmp_path / "basicsr-1.4.2.tar.gz"
     if data is not None:
         archive.write_bytes(data)
-    assert convert_weights.main(["niqe", str(archive), str(tmp_path / "out.npz")]) == 2
+    assert metrics.main(["niqe", str(archive), str(tmp_path / "out.npz")]) == 2
     error = capsys.readouterr().err
     assert str(archive) in error and error.count("\n") == 1
     assert not (tmp_path / "out.npz").exists()
@@ -49,7 +49,7 @@ def test_batch_normalisation_is_folded_in():
     linear = {"Conv_0": {"kernel": kernel, "bias": bias}}
     statistics = {"BatchNorm_0": {"mean": mean.reshape(five), "var": variance.reshape(five)}}
     tree = {"params": {"M": {"B/C": units}, "L": linear}, "batch_stats": {"M": {"B/C": statistics}}}
-    folded = convert_weights.i3d(pickle.dumps(tree))
+    folded = metrics.i3d(pickle.dumps(tree))
     assert set(folded) == {"M.B/C.kernel", "M.B/C.bias", "L.kernel", "L.bias"}
     x = rng.normal(size=3)
     expected = (x @ kernel[0, 0, 0] - mean) / np.sqrt(variance + 1e-3) + bias

