@@ -12,6 +12,7 @@ import pytest
 from experiments.config import config_from, read_recipe
 from experiments.render_rooms.floorplan import Floorplan
 from experiments.render_rooms.shell import floorplan_distance
+from experiments.train_depth import train
 from experiments.train_depth.__main__ import main
 from experiments.train_depth.config import DepthDataConfig, DepthTrainConfig
 from experiments.train_depth.data import DepthData
@@ -23,7 +24,7 @@ from rein3d_jax.depth.network.network import estimate_depth
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.sphere import latitudes, rays_of_pose64, world_from_camera_axes
 from rein3d_jax.io.pictures.image import write_rgb
-from rein3d_jax.networks.depth import read_depth_backbone, read_depth_network, write_depth_network
+from rein3d_jax.networks.depth import depth_shapes, read_depth_backbone, read_depth_network, write_depth_network
 
 ROWS = 32
 CORNERS = [[-2.0, -1.5], [2.0, -1.5], [2.0, 1.5], [-2.0, 1.5]]
@@ -62,13 +63,37 @@ def rooms(tmp_path_factory):
 def config_of(rooms, output, **changes) -> DepthTrainConfig:
     config = config_from(DepthTrainConfig, read_recipe("tiny_depth"))
     data = dataclasses.replace(config.data, rendered=str(rooms), share=1.0, held_out=2, drawn_held_out=0)
-    return dataclasses.replace(config, output=str(output), data=data, **changes)
+    network = dataclasses.replace(config.network, looks=1)  # each takes seconds to compile
+    return dataclasses.replace(config, output=str(output), data=data, network=network, **changes)
 
 
 @pytest.fixture(scope="module")
-def unbroken(rooms, tmp_path_factory):
+def weights(rooms, tmp_path_factory):
+    """A folder of parameters to begin with: an untrained network's own are 800 programs to compile."""
+    folder, rng = tmp_path_factory.mktemp("weights"), np.random.default_rng(0)
+    shapes = depth_shapes(config_of(rooms, folder).network)
+    write_depth_network(folder, jax.tree.map(lambda leaf: 0.1 * rng.normal(size=leaf.shape), shapes))
+    return str(folder)
+
+
+@pytest.fixture(scope="module")
+def one_step():
+    """The runs here differ in their folders alone: all of them take the step that the first one compiles."""
+    compiled, data_parallel = [], train.data_parallel
+
+    def kept(*arguments, **options):
+        compiled.extend([] if compiled else [data_parallel(*arguments, **options)])
+        return compiled[0]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(train, "data_parallel", kept)
+        yield
+
+
+@pytest.fixture(scope="module")
+def unbroken(rooms, weights, one_step, tmp_path_factory):
     """(config, last state) of a run that nobody killed."""
-    config = config_of(rooms, tmp_path_factory.mktemp("run"))
+    config = config_of(rooms, tmp_path_factory.mktemp("run"), weights=weights)
     return config, train_depth(config)
 
 
@@ -132,7 +157,8 @@ def test_its_weights_are_read_back_and_go_on_being_trained(unbroken):
     folder = f"{config.output}/weights"
     parameters = read_depth_network(folder, config.network)
     rgb = jnp.full((1, ROWS, 2 * ROWS, 3), 0.5)
-    assert jnp.isfinite(estimate_depth(parameters, rgb, config.network).log_distance).all()
+    estimate = jax.jit(estimate_depth, static_argnums=2)
+    assert jnp.isfinite(estimate(parameters, rgb, config.network).log_distance).all()
     assert int(state.skipped) == 0
     further = start_parameters(dataclasses.replace(config, weights=folder))
     jax.tree.map(np.testing.assert_array_equal, further, parameters)
@@ -145,8 +171,9 @@ def test_the_backbone_is_read_alone_and_moves_at_its_own_rate(unbroken, tmp_path
     backbone = read_depth_network(f"{config.output}/weights", config.network)["backbone"]
     write_depth_network(tmp_path, backbone)
     jax.tree.map(np.testing.assert_array_equal, read_depth_backbone(tmp_path, config.network), backbone)
-    start = start_parameters(dataclasses.replace(config, backbone=str(tmp_path)))
-    jax.tree.map(np.testing.assert_array_equal, start["backbone"], backbone)
+    drawn = dataclasses.replace(config, weights="", backbone=str(tmp_path))
+    start = jax.jit(lambda: start_parameters(drawn)["backbone"])()  # what is drawn besides is not compiled
+    jax.tree.map(np.testing.assert_array_equal, start, backbone)
 
 
 def test_bad_input_is_one_line_and_exit_code_2(tmp_path, capsys):
