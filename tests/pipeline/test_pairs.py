@@ -1,6 +1,7 @@
 """Pairs of clips: where the frames stand, that both clips show the same place, and what is drawn again or refused."""
 
 import dataclasses
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -24,6 +25,7 @@ ROOMS = RoomConfig(boxes=16, cylinders=8, ellipsoids=8, furnished=0.3)
 CONFIG = PairConfig(height=16, frames=3, speed=4.0, rooms=ROOMS)  # 0.8 m
 
 
+@partial(jax.jit, static_argnums=(1, 2, 3))
 def hall(pose, rows, length=4.0, width=3.0):
     """A room of `length` x `width` x 2.6 m with a checkered shell, traced without any of the project's rooms."""
     half = length / 2
@@ -39,9 +41,22 @@ def drawn():
     return make_pair(jax.random.key(5), CONFIG)
 
 
-@pytest.mark.parametrize("source", ["drawn", "traced"])
-def test_frames_stand_on_a_straight_level_path_from_the_origin(drawn, source):
-    pair = (drawn if source == "drawn" else scene_pair(jax.random.key(0), hall, CONFIG)).pair
+@pytest.fixture(scope="module")
+def traced():
+    return scene_pair(jax.random.key(0), hall, CONFIG)
+
+
+@pytest.fixture
+def pair(request):
+    """The pair of either source."""
+    return request.getfixturevalue(request.param).pair
+
+
+of_both = pytest.mark.parametrize("pair", ["drawn", "traced"], indirect=True)
+
+
+@of_both
+def test_frames_stand_on_a_straight_level_path_from_the_origin(pair):
     poses = np.asarray(pair.clean.world_from_camera)
     np.testing.assert_array_equal(poses, pair.degraded.world_from_camera)
     np.testing.assert_array_equal(poses[:, :3, :3], np.broadcast_to(upright(jnp.zeros(3))[:3, :3], (3, 3, 3)))
@@ -51,9 +66,8 @@ def test_frames_stand_on_a_straight_level_path_from_the_origin(drawn, source):
     assert np.linalg.norm(steps[0]) == pytest.approx(4.0 / 10, abs=1e-6) and abs(steps[0, 2]) < 1e-6
 
 
-@pytest.mark.parametrize("source", ["drawn", "traced"])
-def test_both_clips_show_the_same_place(drawn, source):
-    pair = (drawn if source == "drawn" else scene_pair(jax.random.key(0), hall, CONFIG)).pair
+@of_both
+def test_both_clips_show_the_same_place(pair):
     clean, degraded = pair.clean, pair.degraded
     assert float(clean.alpha.min()) == 1 and bool((clean.distance > 0).all())
     assert bool((degraded.distance > 0)[degraded.alpha > 0].all())

@@ -13,8 +13,11 @@ from rein3d_jax.refine import RefineConfig
 pytestmark = pytest.mark.slow  # whole jobs
 
 
+UNSEEN = ("input.views=none", "film.step=10", "film.yaw_step=3")  # nothing here asks for views or a film
+
+
 def run(recipe, output, *settings):
-    changes = [item for setting in settings for item in ("--set", setting)]
+    changes = [item for setting in (*UNSEEN, *settings) for item in ("--set", setting)]
     assert job.main(["--config", str(recipe), "--output", str(output), *changes]) == 0
     return json.loads((output / "metrics.json").read_text())
 
