@@ -5,14 +5,17 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rein3d_jax.depth.network.loss import DepthExample, DepthLossConfig, depth_loss, gradient_penalty
+from rein3d_jax.depth.network.loss import DepthExample, DepthLossConfig, gradient_penalty
+from rein3d_jax.depth.network.loss import depth_loss as eager_loss
 from rein3d_jax.depth.network.network import DepthPrediction
 
 PLAIN = DepthLossConfig(likelihood=0.0, unknown=0.0)
+depth_loss = jax.jit(eager_loss, static_argnums=2)
 
 
-def truth(seed=0):
-    distance = jnp.exp(0.3 * jax.random.normal(jax.random.key(seed), (2, 16, 32)))
+@jax.jit
+def truth():
+    distance = jnp.exp(0.3 * jax.random.normal(jax.random.key(0), (2, 16, 32)))
     return DepthExample(jnp.zeros((2, 16, 32, 3)), distance.at[:, :, 5:9].set(0.0), distance)
 
 
@@ -33,7 +36,9 @@ def test_what_has_no_distance_gives_no_gradient():
     def loss(log):
         return depth_loss(exact(example).replace(log_distance=log), example, PLAIN)[0]
 
-    slope = jax.grad(loss)(jnp.log(example.background) + 0.1 * jax.random.normal(jax.random.key(1), (2, 16, 32)))
+    slope = jax.jit(jax.grad(loss))(
+        jnp.log(example.background) + 0.1 * jax.random.normal(jax.random.key(1), (2, 16, 32))
+    )
     assert jnp.isfinite(slope).all()
     np.testing.assert_array_equal(slope[:, :, 5:9], 0.0)
     assert (jnp.abs(slope[:, :, 12:30]) > 0).mean() > 0.9
@@ -56,4 +61,4 @@ def test_the_best_scale_is_the_mean_error():
         )
         return depth_loss(wrong, example, only)[0]
 
-    assert abs(jax.grad(loss)(jnp.log(0.3))) < 1e-4
+    assert abs(jax.jit(jax.grad(loss))(jnp.log(0.3))) < 1e-4

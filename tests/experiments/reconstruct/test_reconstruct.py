@@ -22,7 +22,7 @@ from rein3d_jax.io.pictures.image import write_rgb
 from rein3d_jax.io.splats.ply import read_ply
 from rein3d_jax.pipeline.stages import Stages
 from rein3d_jax.pipeline.survey import with_distance
-from rein3d_jax.rasterize import RasterizeConfig, render
+from rein3d_jax.rasterize import RasterizeConfig, allocate, render
 from rein3d_jax.refine import RefineConfig
 
 pytestmark = pytest.mark.slow  # whole jobs
@@ -57,8 +57,9 @@ def test_quality_is_that_of_the_scene_in_the_folder(finished, recipe):
     run = open_run(finished)
     views = [view for view in input_views(run.config.input) if is_novel(view)]
     found = []
+    buffers = allocate(run.refined, [view.camera for view in views], config=run.config.rasterize)  # one program
     for view in views:
-        frame, _ = render(run.refined, view.camera, config=run.config.rasterize)
+        frame, buffers = render(run.refined, view.camera, config=run.config.rasterize, buffers=buffers)
         picture = np.clip(frame.rgb + (1 - frame.alpha[..., None]) * run.backdrop, 0, 1)
         found.append(-10 * np.log10(np.mean((np.asarray(picture) - view.rgb) ** 2)))
     said = json.loads((finished / "metrics.json").read_text())["quality"]["refined"]["psnr"]
