@@ -1,5 +1,7 @@
 """A small room with ground truth as evaluate reads them: a box to walk in and one that hides a part of it."""
 
+import dataclasses
+import functools
 import json
 from types import SimpleNamespace
 
@@ -124,6 +126,18 @@ def turned_pose():
     pose = np.eye(4)
     pose[:3, :3] = WORLD_FROM_CAMERA_AXES
     return pose
+
+
+@pytest.fixture(scope="module")
+def one_step_a_config():
+    """Trainings of the learned restorer that differ in folder and seed alone take one step: neither is in it."""
+    from experiments.train_restore.learned import train
+
+    made = functools.cache(train.make_learned_step)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(train, "make_learned_step", lambda config: made(dataclasses.replace(config, output="", seed=0)))
+        patch.setattr(train, "data_parallel", functools.cache(train.data_parallel))
+        yield
 
 
 @pytest.fixture(scope="session")

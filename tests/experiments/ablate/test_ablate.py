@@ -10,7 +10,7 @@ from experiments.example_store import write_examples
 from rein3d_jax.restore.learned.condition import CANDIDATES, Clip
 from rein3d_jax.restore.learned.loss import Example
 
-pytestmark = pytest.mark.slow  # whole trainings
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("one_step_a_config")]  # whole trainings
 
 ROWS, FRAMES = 16, 2
 RECIPE = """

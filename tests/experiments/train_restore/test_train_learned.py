@@ -10,7 +10,6 @@ from pathlib import Path
 import jax
 import numpy as np
 import pytest
-from jax.experimental.compilation_cache.compilation_cache import reset_cache
 
 from experiments.config import dump_config, load_config
 from experiments.example_store import ExampleStore, write_examples
@@ -27,7 +26,7 @@ from rein3d_jax.restore.learned.config import NetworkConfig
 from rein3d_jax.restore.learned.loss import Example
 from rein3d_jax.restore.restorer import RestoreConfig
 
-pytestmark = pytest.mark.slow  # whole trainings
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("one_step_a_config")]  # whole trainings
 
 ROWS, FRAMES, COUNTED, STEPS = 16, 3, 6, 4
 
@@ -49,17 +48,6 @@ def write(folder, count=COUNTED, make=example):
     return list(write_examples(folder, make, count))
 
 
-@pytest.fixture(scope="module", autouse=True)
-def compiled_once(tmp_path_factory):
-    """Each run compiles its step; a cache on disk, as a user's runs have, spares the tests four of five times."""
-    before = jax.config.jax_compilation_cache_dir
-    jax.config.update("jax_compilation_cache_dir", str(tmp_path_factory.mktemp("programs")))
-    reset_cache()
-    yield
-    jax.config.update("jax_compilation_cache_dir", before)
-    reset_cache()
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     write(path := tmp_path_factory.mktemp("examples"))
@@ -76,7 +64,7 @@ def config_of(folder, output, **options) -> LearnedTrainConfig:
 
 
 @pytest.fixture(scope="module")
-def unbroken(folder, tmp_path_factory):
+def unbroken(folder, one_step_a_config, tmp_path_factory):
     """(config, last state) of a run that nobody killed."""
     config = config_of(folder, tmp_path_factory.mktemp("run"))
     return config, train_learned(config)
