@@ -102,8 +102,8 @@ class EvaluationRoom:
 
     @cached_property
     def panorama(self) -> Panorama:
-        """The input at the rows that the recipe works at, its distance complete."""
-        return self._input_at(self.config.input.rows(len(self.given.rgb)))
+        """The input at the rows that the recipe works at, not upsampled, its distance complete."""
+        return self._input_at(self.config.input.own_rows(len(self.given.rgb)))
 
     @cached_property
     def backdrop(self) -> jax.Array:

@@ -50,7 +50,7 @@ def lift_adaptively(
     capacity = capacity_of(*panorama.distance.shape, config)
     distance, known = _prepared(panorama, config)
     wanted = known & select
-    leaves = partition(leaf_costs(panorama.rgb, distance, wanted, config=config), wanted, capacity)
+    leaves = partition(leaf_costs(panorama.rgb, distance, wanted, config=config), wanted, capacity, config.worth)
     return _gaussians_of(leaves, panorama.rgb, distance, known, world_from_camera, config)
 
 

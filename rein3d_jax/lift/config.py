@@ -17,7 +17,10 @@ class LiftConfig(Settings):
     steepest: float = setting(6.0, "tangent of incidence up to which splats are stretched; 0: never", within="[0, inf)")
     thickness: float = setting(0.3, "a splat's extent across its surface, over its width", within="(0, inf)")
     share: float = setting(1.0, "Gaussians for each pixel at most, larger ones where it is smooth", within="(0, 1]")
-    # The next two are for a share below 1; beside a step of the third splats are narrow, too.
+    # The next three are for a share below 1; beside a step of the fourth splats are narrow, too.
+    worth: float = setting(
+        0.0, "sum over pixels of the error in sRGB that one Gaussian more has to spare; 0: any", within="[0, inf)"
+    )
     max_leaf_side: int = setting(16, "side of what one Gaussian stands for at most", within="[1, inf)", unit="pixels")
     flatness: float = setting(0.003, "relative distance of a surface from its Gaussian's plane", within="[0, inf)")
     leaf_step: float = setting(0.05, "relative step of inverse distance that no Gaussian spans", within="[0, inf)")

@@ -2,6 +2,7 @@
 again and again across or down, found from the pixels up (dyadic CART, Donoho 1997). The price is what makes the count
 fit: a bisection."""
 
+import math
 from functools import partial
 from typing import NamedTuple
 
@@ -22,9 +23,10 @@ class Leaves(NamedTuple):
     missing: jax.Array  # () leaves above capacity: 0 unless even the largest ones are too many
 
 
-@partial(jax.jit, static_argnames=("capacity",))
-def partition(cost: dict[Level, jax.Array], wanted: jax.Array, capacity: int) -> Leaves:
-    """Leaves of a picture, `capacity` at most, of the least total cost.
+@partial(jax.jit, static_argnames=("capacity", "worth"))
+def partition(cost: dict[Level, jax.Array], wanted: jax.Array, capacity: int, worth: float = 0.0) -> Leaves:
+    """Leaves of a picture, `capacity` at most, of the least total cost, each leaf counted as `worth` more: a rectangle
+    is halved only where that spares so much.
 
     `cost[j, k]` (h >> j, w >> k) is that of each rectangle of 2^j x 2^k pixels as one leaf, for all j <= J, k <= K.
     `wanted` (h, w): pixels that are to be covered; the costs have to keep the others apart.
@@ -37,7 +39,9 @@ def partition(cost: dict[Level, jax.Array], wanted: jax.Array, capacity: int) ->
         fits = _plan(cost, some, jnp.exp(middle))[1] <= capacity
         return jnp.where(fits, low, middle), jnp.where(fits, middle, high)
 
-    _, high = jax.lax.fori_loop(0, _BISECTIONS, narrower, tuple(map(jnp.float32, _PRICES)))
+    least, most = _PRICES
+    prices = max(least, math.log(worth)) if worth else least, most
+    _, high = jax.lax.fori_loop(0, _BISECTIONS, narrower, tuple(map(jnp.float32, prices)))
     return _read(_plan(cost, some, jnp.exp(high))[0], wanted, capacity)
 
 

@@ -53,6 +53,16 @@ def test_never_more_than_the_share(share, seed):
     assert 0 < splats.alive.sum() <= share * HEIGHT * WIDTH
 
 
+def test_a_gaussian_has_to_be_worth_it():
+    """Dearer Gaussians are fewer."""
+    counts = [
+        int(lift_adaptively(box(), ORIGIN, EVERY, config=replace(CONFIG, share=0.6, worth=worth)).alive.sum())
+        for worth in (0.0, 0.01, 0.1, 1.0)
+    ]
+    assert counts == sorted(counts, reverse=True)
+    assert counts[0] > counts[1] > counts[3]  # the plain walls' first, then the noise's
+
+
 def test_share_one_is_one_for_each_pixel():
     whole, each = lift_adaptively(box(), ORIGIN, EVERY, config=LiftConfig()), lift(box(), ORIGIN, EVERY)
     jax.tree.map(np.testing.assert_array_equal, whole, each)
