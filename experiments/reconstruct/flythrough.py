@@ -28,7 +28,8 @@ class FilmConfig(Settings):
 
 
 def _camera(position, yaw, film: FilmConfig) -> Camera:
-    focal, centre = jnp.full(2, focal_from_fov(film.fov, film.width)), jnp.array([film.width / 2, film.height / 2])
+    focal = jnp.full(2, focal_from_fov(film.fov, film.width), jnp.float32)
+    centre = jnp.array([film.width / 2, film.height / 2])
     return Camera(upright(position, yaw), focal, centre, PINHOLE, film.width, film.height)
 
 

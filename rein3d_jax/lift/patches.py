@@ -1,5 +1,7 @@
 """Patches of a surface that a panorama saw, and the Gaussians that show them."""
 
+import math
+
 import jax
 import jax.numpy as jnp
 from flax import struct
@@ -63,7 +65,8 @@ def gaussians_of(patches: Patches, world_from_camera: jax.Array, *, pitch: float
         means=jnp.matmul(middle, rotation.T, precision=jax.lax.Precision.HIGHEST) + world_from_camera[:3, 3],
         log_scales=jnp.log(scales),
         quats=quats_from_matrix(jnp.matmul(rotation, axes, precision=jax.lax.Precision.HIGHEST)),
-        opacity_logits=jnp.full(len(middle), jnp.log(config.opacity / (1 - config.opacity))),
+        # Of float32 and no weaker: a scene that was read, or refined, would be another type, and be compiled again.
+        opacity_logits=jnp.full(len(middle), math.log(config.opacity / (1 - config.opacity)), jnp.float32),
         sh=sh_from_rgb(traits.rgb[:, None]),
         alive=patches.alive,
     )

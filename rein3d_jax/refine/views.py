@@ -31,9 +31,8 @@ class Views:
 def camera_of(views: Views, index: int | jax.Array) -> Camera:
     """The camera of view `index`."""
     size = views.rgb.shape[1]
-    return Camera(
-        views.world_from_camera[index], jnp.full(2, views.focal[index]), jnp.full(2, size / 2), PINHOLE, size, size
-    )
+    focal, centre = jnp.full(2, views.focal[index]), jnp.full(2, size / 2, jnp.float32)
+    return Camera(views.world_from_camera[index], focal, centre, PINHOLE, size, size)
 
 
 def join_views(*parts: Views) -> Views:

@@ -139,6 +139,12 @@ def test_only_selected_known_pixels_come_alive_and_all_is_finite() -> None:
     assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(splats))
 
 
+def test_a_lifted_scene_has_the_types_of_one_that_was_read() -> None:
+    """A weakly typed leaf would have the rasterizer traced and compiled once more."""
+    splats = lift(panorama(0), ORIGIN, EVERY)
+    assert not any(leaf.weak_type for leaf in jax.tree.leaves(splats))
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**31), st.floats(1e-3, 1e3), st.floats(0, 1))
 def test_any_valid_input_is_finite_with_unit_quaternions(seed: int, scale: float, share: float) -> None:

@@ -94,7 +94,8 @@ def _first_guess(key: jax.Array, shape: tuple[int, ...], dtype=jnp.float32) -> j
 
 def initial_depth_parameters(key: jax.Array, config: DepthNetworkConfig = DepthNetworkConfig()) -> dict:
     """Parameters of an untrained network."""
-    return DepthNetwork(config).init(key, jnp.zeros((1, COARSEST, 2 * COARSEST, 3)))["params"]
+    # Compiled: layer by layer it is 800 programs.
+    return jax.jit(DepthNetwork(config).init)(key, jnp.zeros((1, COARSEST, 2 * COARSEST, 3)))["params"]
 
 
 def estimate_depth(parameters: dict, rgb: jax.Array, config: DepthNetworkConfig) -> DepthPrediction:
