@@ -116,6 +116,13 @@ def told_panorama(config: InputConfig, upsampler: dict | None = None) -> tuple[P
     return panorama, "; ".join(filter(None, (converted, scaled))), lean
 
 
+def working_rows(config: InputConfig) -> int:
+    """Rows that the job will work at. Raises InputError as `read_rgb` does for a picture's header."""
+    path = resolve(config.panorama)
+    require_file(path)
+    return config.rows(panorama_rows(path))
+
+
 def _picture(path: Path, config: InputConfig, upsampler: dict | None) -> jax.Array:
     """(h, 2 h, 3) at the rows to work at."""
     rows = panorama_rows(path)

@@ -10,9 +10,9 @@ import jax
 import numpy as np
 
 from experiments.config import dump_config
-from experiments.reconstruct.budget import OUT_OF_TIME, Clock, within
+from experiments.reconstruct.budget import OUT_OF_TIME, Clock, check_memory, machine_bytes, within
 from experiments.reconstruct.config import ReconstructConfig
-from experiments.reconstruct.inputs import input_fingerprint, input_views, levelled_views, told_panorama
+from experiments.reconstruct.inputs import input_fingerprint, input_views, levelled_views, told_panorama, working_rows
 from experiments.reconstruct.outputs import write_outputs
 from experiments.reconstruct.progress import Progress
 from experiments.reconstruct.run import Run
@@ -58,6 +58,7 @@ def run_job(config: ReconstructConfig, *, resume: bool = False) -> dict:
     """Run the job; returns what metrics.json holds. Raises InputError for whatever is wrong with the input."""
     clock, output = Clock(config.budget), Path(config.output)
     views = input_views(config.input)  # a bad view is found before the long part
+    check_memory(working_rows(config.input), machine_bytes())
     files = input_fingerprint(config.input)
     write_text(output / "config.toml", _header() + dump_config(config))
     config = within(config, config.budget)

@@ -39,7 +39,7 @@ def write_outputs(run: Run, store: StageStore, clock: Clock) -> dict:
     ends = _ends(result.trajectories)
     (coarse_ends, seen), (refined_ends, covered) = (_panoramas(scene, ends, config) for scene in scenes)
     metrics = {
-        **run_metrics.cost(store),
+        **run_metrics.cost(store, len(result.panorama.rgb)),
         **run_metrics.size(result, output / "scene.ply"),
         **run_metrics.trouble(result),
         **run_metrics.choices(result, store, config.explore),

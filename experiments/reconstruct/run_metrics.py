@@ -3,16 +3,18 @@
 import resource
 from pathlib import Path
 
+from experiments.reconstruct.budget import foreseen_bytes
 from experiments.reconstruct.stage_store import StageStore
 from rein3d_jax.depth.level import Lean
 from rein3d_jax.explore.profile import ExploreConfig
 from rein3d_jax.pipeline.reconstruct import Reconstruction
 
 
-def cost(store: StageStore) -> dict:
-    """Seconds by stage, and the most memory that the process held."""
+def cost(store: StageStore, rows: int) -> dict:
+    """Seconds by stage, and the most memory that the process held, beside what was foreseen for so many rows."""
     seconds = {**{name: round(value, 3) for name, value in store.seconds().items()}, "write": 0.0, "total": 0.0}
-    return {"seconds": seconds, "peak_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024}
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    return {"seconds": seconds, "peak_bytes": peak, "foreseen_bytes": foreseen_bytes(rows)}
 
 
 def size(result: Reconstruction, ply: Path) -> dict:

@@ -1,21 +1,41 @@
-"""viewer.html of a finished run."""
+"""viewer.html of a finished run: of a size that browsers load, whatever the scene's; scene.ply beside it is whole."""
 
 import numpy as np
 
 from experiments.reconstruct.run import Run
 from experiments.reconstruct.run_report import room_plan
+from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.io.pictures.image import encode_jpeg
 from rein3d_jax.io.splats.spz import encode_spz
+from rein3d_jax.pipeline.stages import origin_pose
+from rein3d_jax.refine.prune import contribution, prune_to
 from rein3d_jax.report.viewer import render_viewer
+from rein3d_jax.scene import Gaussians
+
+_LARGEST = 15_000_000  # bytes of SPZ: 20 MB of text in the page, beside 4 MB of code and panorama
 
 
 def viewer_page(run: Run) -> str:
-    """The input panorama, and both scenes as they come back from SPZ. Raises InputError where SPZ cannot hold one."""
+    """The input panorama, and both scenes as they come back from SPZ; the refined one alone where both are too large,
+    and what adds most to it where it is too large alone. Raises InputError where SPZ cannot hold one."""
     result, config = run.result, run.config
     scenes = {
         "Coarse": encode_spz(result.coarse, "the lifted scene"),
         "Refined": encode_spz(result.scene, "the refined scene"),
     }
+    if sum(map(len, scenes.values())) > _LARGEST:
+        del scenes["Coarse"]
+    if len(scenes["Refined"]) > _LARGEST:
+        scenes["Refined"] = encode_spz(_what_adds_most(run, _LARGEST / len(scenes["Refined"])), "the refined scene")
     panorama = encode_jpeg(np.asarray(result.panorama.rgb))
     plan, variance = room_plan(result.trajectories, config.explore, run.views), config.rasterize.filter_variance
     return render_viewer(scenes, panorama, plan, backdrop=np.asarray(run.backdrop), filter_variance=variance)
+
+
+def _what_adds_most(run: Run, share: float) -> Gaussians:
+    """A share of the refined scene: what adds most to panoramas from the origin and from the ends of the paths."""
+    paths, scene = run.result.trajectories, run.result.scene
+    ends = [poses[int(count) - 1] for poses, count in zip(paths.world_from_camera, paths.counts, strict=True)]
+    cameras = [equirectangular_camera(pose, len(run.result.panorama.rgb)) for pose in (origin_pose(), *ends)]
+    weight = contribution(scene, cameras, config=run.config.rasterize)
+    return prune_to(scene, weight, int(share * int(scene.alive.sum())))

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from experiments.reconstruct import __main__ as job
-from experiments.reconstruct.budget import BudgetConfig, Clock, bytes_of_one, within
+from experiments.reconstruct.budget import BudgetConfig, Clock, bytes_of_one, check_memory, foreseen_bytes, within
 from rein3d_jax.errors import InputError
 from rein3d_jax.pipeline.stages import Stages
 from rein3d_jax.refine import RefineConfig
@@ -31,6 +31,15 @@ def test_the_smaller_limit_counts(budget, limit):
     stages = Stages(refine=RefineConfig(sh_degree=0))
     assert within(stages, BudgetConfig(**budget)).refine.max_count == limit
     assert within(stages, BudgetConfig()) == stages
+
+
+def test_a_panorama_that_does_not_fit_is_refused_with_one_that_does():
+    check_memory(1024, foreseen_bytes(1024))
+    with pytest.raises(InputError, match=r"4096 x 2048 pixels take about .* GB .*: set input.height = 1024") as refused:
+        check_memory(2048, foreseen_bytes(1024))
+    assert str(refused.value).count("\n") == 0
+    with pytest.raises(InputError, match="take a machine with more"):
+        check_memory(64, 10**9)
 
 
 @pytest.mark.parametrize("bad", [{"gaussians": -1}, {"bytes": 10}, {"seconds": -1.0}, {"tolerance": -0.1}])

@@ -9,10 +9,12 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
+from experiments.reconstruct import viewer_page as viewer
 from experiments.reconstruct.inputs import SAMPLES, InputConfig
 from experiments.reconstruct.run import Pictures, Run
 from experiments.reconstruct.run_report import longest, run_report
 from experiments.reconstruct.sources import sources
+from experiments.reconstruct.viewer_page import viewer_page
 from experiments.run_folder import open_run
 from rein3d_jax.depth.estimate import DepthConfig
 from rein3d_jax.depth.level import unasked_lean
@@ -151,3 +153,13 @@ def test_doubt_is_shown_where_there_is_any(run):
     assert abs(doubtful.in_doubt - 0.5) < 1e-6  # every second column
     page = render_report(report(doubtful))
     assert "third picture is doubt" in page and "for 50% of the panorama" in page
+
+
+def test_a_page_that_would_be_too_large_shows_the_refined_scene_alone_and_of_it_what_adds_most(run, monkeypatch):
+    whole = viewer_page(run)
+    assert {"Coarse", "Refined"} <= set(re.findall(r'"name": "(\w+)"', whole))
+    monkeypatch.setattr(viewer, "_LARGEST", 20_000)
+    small = viewer_page(run)
+    assert re.findall(r'"name": "(\w+)"', small) == ["Refined"]
+    (scene,) = re.findall(r'"spz": "([^"]*)"', small)
+    assert 15_000 < len(scene) * 3 / 4 < 22_000  # base64; compression is not quite proportional
