@@ -17,7 +17,7 @@ import importlib
 
 __version__ = "0.2.0"
 
-# name -> the module that it stands in
+# name -> the module that it stands in, and its name there where that is another
 _DOORS = {
     **dict.fromkeys(("Camera", "Gaussians", "Pair", "Panorama", "Video"), "scene"),
     **dict.fromkeys(("equirectangular_camera", "pinhole_camera", "upright"), "geometry.poses"),
@@ -28,6 +28,7 @@ _DOORS = {
     "read_depth_network": "networks.depth",
     "read_upsampler": "networks.upsampler",
     **dict.fromkeys(("read_splats", "write_splats"), "io.splats.gaussian_file"),
+    "read_gaussians": "io.splats.gaussian_file:read_splats",  # as tools that measure scenes ask for it
     **dict.fromkeys(("Decisions", "Reconstruction", "reconstruct"), "pipeline.reconstruct"),
     "Stages": "pipeline.stages",
     **dict.fromkeys(("Survey", "survey", "with_distance"), "pipeline.survey"),
@@ -44,7 +45,8 @@ def __getattr__(name: str):
     if name in _ROOMS:
         return importlib.import_module(f"{__name__}.{name}")
     if name in _DOORS:
-        return getattr(importlib.import_module(f"{__name__}.{_DOORS[name]}"), name)
+        module, _, there = _DOORS[name].partition(":")
+        return getattr(importlib.import_module(f"{__name__}.{module}"), there or name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -11,7 +11,8 @@ import rein3d_jax as r3d
 def test_every_name_opens_what_it_names():
     for name in r3d.__all__:
         found = getattr(r3d, name)
-        assert getattr(found, "__name__", name).split(".")[-1] in (name, "Stages"), name
+        assert getattr(found, "__name__", name).split(".")[-1] in (name, "Stages", "read_splats"), name
+    assert r3d.read_gaussians is r3d.read_splats
     assert set(r3d.__all__) == set(dir(r3d))
 
 
