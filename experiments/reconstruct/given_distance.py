@@ -1,16 +1,16 @@
-"""A distance map from a file as metres along the ray: read, converted by what its numbers are, scaled by the camera's
+"""A distance map from a file as metres along the ray: converted by what its numbers are, scaled by the camera's
 height where they have no unit. Whatever was done is told, and a map that no room has is refused."""
 
 from pathlib import Path
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from rein3d_jax.depth.kinds import along_ray
 from rein3d_jax.depth.plausible import flattest_kind, implausible_size
 from rein3d_jax.depth.scale import height_above_floor
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.pictures.distance import read_distance
 from rein3d_jax.scene import Panorama
 from rein3d_jax.upsample import distance_for
 
@@ -21,12 +21,13 @@ _MEANS = {
 }
 
 
-def given_distance(rgb: jax.Array, path: Path, kind: str) -> tuple[Panorama, str]:
-    """The panorama of a picture (h, 2 h, 3) and a file of numbers of a `kind`, distances along rays (up to a factor,
-    unless the kind is metric), and what was done to it, in words. Raises InputError for what `read_distance` refuses,
-    and for a map of the kind "distance" with the surfaces of another."""
-    values, valid = read_distance(path, metres=kind == "distance")
-    told = []
+def given_distance(
+    rgb: jax.Array, numbers: tuple[np.ndarray, np.ndarray], path: Path, kind: str
+) -> tuple[Panorama, str]:
+    """The panorama of a picture (h, 2 h, 3) and the `numbers` of a `kind` that stand in a file, with the mask of what
+    is known: distances along rays (up to a factor, unless the kind is metric), and what was done to them, in words.
+    Raises InputError for a map of the kind "distance" with the surfaces of another."""
+    (values, valid), told = numbers, []
     if len(values) != len(rgb):
         told.append("the map is {}x{}, brought to {}x{}".format(*values.shape[::-1], *rgb.shape[1::-1]))
     if kind != "distance":

@@ -15,6 +15,7 @@ from rein3d_jax.depth.level import Lean, estimate_lean, levelled, unasked_lean
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.poses import rigid
 from rein3d_jax.io.files.input_file import require_file
+from rein3d_jax.io.pictures.distance import read_distance
 from rein3d_jax.io.pictures.image import panorama_rows
 from rein3d_jax.io.pictures.panorama import read_panorama
 from rein3d_jax.io.rooms import traced_room
@@ -104,13 +105,14 @@ def told_panorama(config: InputConfig, upsampler: dict | None = None) -> tuple[P
     the picture leaned."""
     path = resolve(config.panorama)
     require_file(path)
-    rgb = _picture(path, config, upsampler)
     if config.distance is None:
+        rgb = _picture(path, config, upsampler)
         unknown = jnp.zeros(rgb.shape[:2])
         panorama, lean = _levelled(Panorama(rgb, unknown, unknown > 0), config)
         return panorama, "", lean
-    given = resolve(config.distance)
-    panorama, converted = given_distance(rgb, given, config.distance_kind)
+    given, kind = resolve(config.distance), config.distance_kind
+    numbers = read_distance(given, metres=kind == "distance")  # a bad file is refused before the picture is upsampled
+    panorama, converted = given_distance(_picture(path, config, upsampler), numbers, given, kind)
     panorama, lean = _levelled(panorama, config)  # a floor is looked for below
     panorama, scaled = in_metres(panorama, given, config.eye_height if config.scaled else None)
     return panorama, "; ".join(filter(None, (converted, scaled))), lean
