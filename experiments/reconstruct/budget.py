@@ -1,7 +1,6 @@
 """What a scene may take: Gaussians, bytes of scene.ply, seconds. The stages then model no more than that."""
 
 import dataclasses
-import os
 import time
 from dataclasses import dataclass
 
@@ -56,11 +55,6 @@ def check_memory(rows: int, available: int) -> None:
     mend = f"set input.height = {fits}" if fits else "take a machine with more"
     needed, has = (f"{x / 1e9:.1f} GB" for x in (foreseen_bytes(rows), available))
     raise InputError(f"{2 * rows} x {rows} pixels take about {needed} of memory, and there are {has}: {mend}")
-
-
-def machine_bytes() -> int:
-    """Memory of this machine."""
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
 class Clock:

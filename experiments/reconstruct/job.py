@@ -10,7 +10,8 @@ import jax
 import numpy as np
 
 from experiments.config import dump_config
-from experiments.reconstruct.budget import OUT_OF_TIME, Clock, check_memory, machine_bytes, within
+from experiments.machine import machine_bytes
+from experiments.reconstruct.budget import OUT_OF_TIME, Clock, check_memory, within
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.inputs import input_fingerprint, input_views, levelled_views, told_panorama, working_rows
 from experiments.reconstruct.outputs import write_outputs

@@ -19,7 +19,7 @@ from experiments.reconstruct.run_report import longest, run_report
 from experiments.reconstruct.stage_store import StageStore
 from experiments.reconstruct.viewer_page import viewer_page
 from rein3d_jax.evaluate.coverage import coverage
-from rein3d_jax.explore.trajectories import Trajectories
+from rein3d_jax.explore.trajectories import Trajectories, path_ends
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.pictures.video import write_mp4
 from rein3d_jax.io.splats.ply import write_ply
@@ -61,8 +61,7 @@ def write_outputs(run: Run, store: StageStore, clock: Clock) -> dict:
 
 def _ends(trajectories: Trajectories) -> jax.Array:
     """(k, 4, 4) poses at the ends of the longest trajectories."""
-    chosen = longest(trajectories)
-    return jnp.stack([trajectories.world_from_camera[i, int(trajectories.counts[i]) - 1] for i in chosen])
+    return path_ends(trajectories)[jnp.array(longest(trajectories))]
 
 
 def _panoramas(scene: Gaussians, poses: jax.Array, config) -> tuple[list, float]:

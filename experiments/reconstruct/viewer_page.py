@@ -4,6 +4,7 @@ import numpy as np
 
 from experiments.reconstruct.run import Run
 from experiments.reconstruct.run_report import room_plan
+from rein3d_jax.explore.trajectories import path_ends
 from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.io.pictures.image import encode_jpeg
 from rein3d_jax.io.splats.spz import encode_spz
@@ -37,8 +38,8 @@ def viewer_page(run: Run) -> str:
 
 def _what_adds_most(run: Run, share: float) -> Gaussians:
     """A share of the refined scene: what adds most to panoramas from the origin and from the ends of the paths."""
-    paths, scene = run.result.trajectories, run.result.scene
-    ends = [poses[int(count) - 1] for poses, count in zip(paths.world_from_camera, paths.counts, strict=True)]
-    cameras = [equirectangular_camera(pose, len(run.result.panorama.rgb)) for pose in (origin_pose(), *ends)]
+    scene, rows = run.result.scene, len(run.result.panorama.rgb)
+    poses = (origin_pose(), *path_ends(run.result.trajectories))
+    cameras = [equirectangular_camera(pose, rows) for pose in poses]
     weight = contribution(scene, cameras, config=run.config.rasterize)
     return prune_to(scene, weight, int(share * int(scene.alive.sum())))

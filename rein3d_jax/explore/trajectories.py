@@ -30,6 +30,11 @@ class Trajectories:
     safe: jax.Array  # (w,) metres, D_safe by column
 
 
+def path_ends(paths: Trajectories) -> jax.Array:
+    """world_from_camera (tau, 4, 4) of each path's last frame."""
+    return paths.world_from_camera[jnp.arange(len(paths.counts)), paths.counts - 1]
+
+
 def _fan(rotation: jax.Array, count: int) -> jax.Array:
     """Directions (..., tau) of an even fan: phi_i = theta + i 2 pi / tau."""
     return rotation[..., None] + jnp.arange(count) * (2 * jnp.pi / count)

@@ -1,4 +1,5 @@
-"""Masks on the sphere: sums over windows and closing, seamless across +-180 degrees and over the poles."""
+"""Windows on the sphere: sums over them, their least and most, and the closing of masks; seamless across +-180 degrees
+and over the poles."""
 
 import jax
 import jax.numpy as jnp
@@ -12,6 +13,16 @@ def window_sum(image: jax.Array, radius: int) -> jax.Array:
     padded = pad_sphere(image, radius)
     rows = sum(padded[i : i + image.shape[0]] for i in range(size))
     return sum(rows[:, i : i + image.shape[1]] for i in range(size))
+
+
+def window_range(image: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """The least and the most of the 3 x 3 pixels around each one of (h, w): (h, w) each."""
+    padded = pad_sphere(image, 1)
+    least, most = (
+        jax.lax.reduce_window(padded, start, choose, (3, 3), (1, 1), "valid")
+        for start, choose in ((jnp.inf, jax.lax.min), (-jnp.inf, jax.lax.max))
+    )
+    return least, most
 
 
 def closing(mask: jax.Array, radius: int) -> jax.Array:

@@ -21,6 +21,11 @@ def blocks(image: jax.Array) -> jax.Array:
     return jnp.moveaxis(split, 2, 1).reshape(height // 2, width // 2, 4, *image.shape[2:])
 
 
+def halve(image: jax.Array) -> jax.Array:
+    """The image at half the size, each pixel the mean of 2 x 2: (h, w, ...) -> (h / 2, w / 2, ...)."""
+    return blocks(image).mean(axis=2)
+
+
 def double(image: jax.Array) -> jax.Array:
     """The image at twice the size, bilinear: weights 3/4 and 1/4, as the new centres lie. (h, w, ...) -> (2 h, 2 w,
     ...)."""

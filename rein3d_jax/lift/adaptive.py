@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.geometry.resample import pad_sphere
+from rein3d_jax.geometry.morphology import window_range
 from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.lift.config import LiftConfig
 from rein3d_jax.lift.leaf_cost import largest_side, leaf_costs, levels_of
@@ -82,8 +82,7 @@ def _overlap_of_leaves(overlap: jax.Array, leaves: Leaves, levels: list[Level]) 
     reach as far beyond it as it is wide, and would lie on its neighbours' detail."""
     height, width = overlap.shape
     for rows, columns in ((1 << j, 1 << k) for j, k in levels[1:]):
-        cells = pad_sphere(overlap.reshape(height // rows, rows, width // columns, columns).min((1, 3)), 1)
-        least = jax.lax.reduce_window(cells, jnp.inf, jax.lax.min, (3, 3), (1, 1), "valid")
+        least, _ = window_range(overlap.reshape(height // rows, rows, width // columns, columns).min((1, 3)))
         here = (leaves.sides == jnp.array([rows, columns])).all(-1)
         overlap = jnp.where(here, jnp.repeat(jnp.repeat(least, rows, axis=0), columns, axis=1), overlap)
     return overlap

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from rein3d_jax.evaluate.coverage import coverage
+from rein3d_jax.explore.trajectories import path_ends
 from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.pipeline.fuse import Fused, fuse_guesses
 from rein3d_jax.pipeline.stages import Stages, render_video
@@ -65,8 +66,6 @@ def _explored(known: Survey, restore: Restorer, key: jax.Array, stages: Stages, 
 
 
 def _first_buffers(known: Survey, stages: Stages) -> Buffers:
-    paths = known.trajectories
-    ends = [poses[int(n) - 1] for poses, n in zip(paths.world_from_camera, paths.counts, strict=True)]
-    cameras = [equirectangular_camera(pose, stages.restore.height) for pose in ends]
+    cameras = [equirectangular_camera(pose, stages.restore.height) for pose in path_ends(known.trajectories)]
     # What exploring adds needs room too; 1.5 keeps most runs from compiling the rasterizer twice.
     return allocate(known.coarse, cameras, config=stages.rasterize, slack=1.5)

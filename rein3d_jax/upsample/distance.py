@@ -8,6 +8,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 
+from rein3d_jax.geometry.morphology import window_range
 from rein3d_jax.geometry.resample import pad_sphere, sample_sphere
 
 SAME_SURFACE = 1.2  # ratio within 3 x 3 pixels; a wall of 256 rows seen at 75 degrees has 1.1
@@ -54,7 +55,10 @@ def finer_distance(distance: jax.Array, picture: jax.Array) -> jax.Array:
     inverse = jnp.where(known, 1 / jnp.where(known, distance, 1.0), 0.0)
     colours = jax.image.resize(picture, (small, 2 * small, 3), "linear")
     around = pad_sphere(jnp.concatenate([inverse[..., None], _slopes(inverse), colours], axis=-1), 1)
+    lowest, most = window_range(inverse)  # 0 where one is unknown
+    least, _ = window_range(jnp.where(known, inverse, jnp.inf))
     row, column = _holders(small, height)[:, None], _holders(2 * small, width)[None]
+    one_surface, least, most = (x[row, column] for x in (most < SAME_SURFACE * lowest, least, most))
     v, u = ((jnp.arange(n) + 0.5) * small / height for n in (height, width))
 
     def speaks(offset):
@@ -68,12 +72,6 @@ def finer_distance(distance: jax.Array, picture: jax.Array) -> jax.Array:
     neighbours = jnp.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
     blank = jnp.zeros((height, width))
 
-    def range_of(carry, offset):
-        _, own, _, _ = speaks(offset)
-        seen = own > 0
-        return (jnp.minimum(carry[0], jnp.where(seen, own, jnp.inf)), jnp.maximum(carry[1], own), carry[2] & seen), None
-
-    (least, most, whole), _ = jax.lax.scan(range_of, (blank + jnp.inf, blank, blank == 0), neighbours)
     between = jnp.sqrt(least * most)
 
     def vote(carry, offset):
@@ -87,7 +85,7 @@ def finer_distance(distance: jax.Array, picture: jax.Array) -> jax.Array:
     (near, far), _ = jax.lax.scan(vote, ((blank,) * 3, (blank,) * 3), neighbours)
     chosen = jnp.clip(jnp.where(near[0] > far[0], near[2], far[2]), least / 1.05, 1.05 * most)
     smooth = sample_sphere(inverse, *jnp.broadcast_arrays(u[None], v[:, None]))
-    found = jnp.where(whole & (most < SAME_SURFACE * least), smooth, chosen)
+    found = jnp.where(one_surface, smooth, chosen)
     return jnp.where(known[row, column], 1 / jnp.where(found > 0, found, 1.0), 0.0)
 
 

@@ -86,9 +86,7 @@ class _InWindows(nn.Module):
             attended.append(window_attention(parts[..., number * half :][..., :half], near, shifted, window))
         attended = jnp.concatenate(attended, axis=-1)
         local = _gelu(_Depthwise(name="local")(parts[:, :, 2]))
-        of_channels = _gate_of_channels(local, self)
-        of_pixels = _gate_of_pixels(attended, self)
-        return nn.Dense(_WIDTH, name="out")(attended * of_channels + local * of_pixels)
+        return nn.Dense(_WIDTH, name="out")(_joined(attended, local, self))
 
 
 class _BetweenChannels(nn.Module):
@@ -103,9 +101,7 @@ class _BetweenChannels(nn.Module):
         alike = jnp.einsum("nhc,nhd->hcd", query, key) * warmth[:, None, None]
         attended = jnp.einsum("hcd,nhd->nhc", jax.nn.softmax(alike, axis=-1), parts[:, 2]).reshape(grid.shape)
         local = _gelu(_Depthwise(name="local")(parts[:, 2].reshape(grid.shape)))
-        of_channels = _gate_of_channels(attended, self)
-        of_pixels = _gate_of_pixels(local, self)
-        return nn.Dense(_WIDTH, name="out")(attended * of_pixels + local * of_channels)
+        return nn.Dense(_WIDTH, name="out")(_joined(local, attended, self))
 
 
 class _Gated(nn.Module):
@@ -165,6 +161,12 @@ _gelu = partial(nn.gelu, approximate=False)
 
 def _unit_over_pixels(part: jax.Array) -> jax.Array:
     return part / jnp.maximum(jnp.sqrt(jnp.sum(part**2, axis=0, keepdims=True)), 1e-12)
+
+
+def _joined(of_pixels: jax.Array, of_channels: jax.Array, module: nn.Module) -> jax.Array:
+    """What looked at pixels, gated channel by channel by the other, and the other, gated pixel by pixel by it."""
+    by_channel = _gate_of_channels(of_channels, module)
+    return of_pixels * by_channel + of_channels * _gate_of_pixels(of_pixels, module)
 
 
 def _gate_of_channels(grid: jax.Array, module: nn.Module) -> jax.Array:

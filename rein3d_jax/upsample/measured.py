@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 
-from rein3d_jax.geometry.pyramid import blocks
+from rein3d_jax.geometry.pyramid import blocks, halve
 
 _AGREES = 0.03  # sRGB by which what was seen from elsewhere may differ: reflections, and edges a pixel off
 
@@ -26,6 +26,6 @@ def as_measured(fine: jax.Array, measured: jax.Array) -> jax.Array:
 def borne_out(fine: jax.Array, measured: jax.Array) -> jax.Array:
     """How far (2 h, 2 w), in [0, 1], the mean of each 2 x 2 pixels of `fine` (2 h, 2 w, 3) is what was `measured`
     (h, w, 3)."""
-    off = blocks(fine).mean(axis=2) - measured
+    off = halve(fine) - measured
     share = jnp.exp(-jnp.sum(off**2, axis=-1) / (2 * _AGREES**2))
     return jnp.repeat(jnp.repeat(share, 2, axis=0), 2, axis=1)

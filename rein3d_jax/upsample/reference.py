@@ -6,8 +6,9 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from rein3d_jax.geometry.pyramid import blocks, levels
-from rein3d_jax.geometry.resample import pad_sphere, sample_sphere_cubic
+from rein3d_jax.geometry.morphology import window_range
+from rein3d_jax.geometry.pyramid import halve, levels
+from rein3d_jax.geometry.resample import sample_sphere_cubic
 from rein3d_jax.geometry.safe import safe_norm
 from rein3d_jax.geometry.sphere import latitudes, pixels_from_rays, rays_of_pose
 from rein3d_jax.scene import Panorama
@@ -47,11 +48,7 @@ def reference_colours(panorama: Panorama, pose: jax.Array, distance: jax.Array) 
 
 def _away_from_edges(distance: jax.Array) -> jax.Array:
     """The distance, 0 where 3 x 3 pixels see more than one surface: colours are mixed there."""
-    around = pad_sphere(distance, 1)
-    least, most = (
-        jax.lax.reduce_window(around, start, choose, (3, 3), (1, 1), "valid")
-        for start, choose in ((jnp.inf, jax.lax.min), (-jnp.inf, jax.lax.max))
-    )
+    least, most = window_range(distance)
     return jnp.where(most < SAME_SURFACE * least, distance, 0.0)
 
 
@@ -79,5 +76,5 @@ def _at_level(image: jax.Array, u: jax.Array, v: jax.Array, level: jax.Array) ->
         share = jnp.clip(1 - jnp.abs(level - index), 0, 1)
         found += share * sample_sphere_cubic(image, u / 2**index, v / 2**index)
         if index < count:
-            image = blocks(image).mean(axis=2)
+            image = halve(image)
     return found

@@ -24,6 +24,7 @@ PARTS = {
     "studies.box_room",
     "convert.__init__",
     "convert.array_pickle",
+    "convert.checkpoint",
 }
 SMALL = Size(40, 0.3, 24, 16)
 

@@ -5,17 +5,11 @@ import jax
 import numpy as np
 import pytest
 
-from rein3d_jax.depth.network.network import initial_depth_parameters
+from rein3d_jax.networks.depth import depth_shapes
 
 
 @pytest.fixture(scope="session")
-def depth_shapes():
-    """Shapes of the parameters of a network of a config's sizes."""
-    return lambda config: jax.eval_shape(lambda: initial_depth_parameters(jax.random.key(0), config))
-
-
-@pytest.fixture(scope="session")
-def random_network(depth_shapes):
+def random_network():
     """Parameters of a config's sizes, none of them 0: kernels that keep a signal's size, scales about 1."""
 
     def made(config):

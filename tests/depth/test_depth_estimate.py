@@ -10,6 +10,7 @@ from rein3d_jax.depth.network.config import DepthNetworkConfig
 from rein3d_jax.depth.room_shell import RoomShellConfig
 from rein3d_jax.geometry.shell import RoomShell, meet_shell
 from rein3d_jax.geometry.sphere import pixel_rays
+from rein3d_jax.networks.depth import depth_shapes
 
 H, W = 64, 128
 TINY = DepthNetworkConfig(
@@ -56,7 +57,7 @@ def test_metres_follow_the_camera_s_height(estimate, first):
     np.testing.assert_allclose(estimate(room(), 2.5).distance, 2.5 * first.distance, rtol=1e-6)
 
 
-def test_it_exports_for_accelerators(depth_shapes):
+def test_it_exports_for_accelerators():
     rgb = jax.ShapeDtypeStruct((256, 512, 3), jnp.float32)
     whole = jax.jit(
         lambda rgb, parameters: estimate_distance(rgb, parameters, 1.6, config=TINY, shell=RoomShellConfig())

@@ -5,13 +5,13 @@ samples/STEP.png (a held-out clip: rendered, restored, clean), and weights/, the
 restore.weights takes.
 """
 
-import os
 from pathlib import Path
 
 import jax
 import numpy as np
 from jax.sharding import NamedSharding, PartitionSpec
 
+from experiments.machine import machine_bytes
 from experiments.train_restore.run import clips_per_device, last_step
 from experiments.train_restore.wan.config import WanTrainConfig
 from experiments.train_restore.wan.data import open_pairs, pair_batches
@@ -56,7 +56,7 @@ def _check(config: WanTrainConfig, pairs: PairDataset, devices: int) -> None:
 def device_memory() -> int:
     """Bytes that the first device may use; on a CPU, all of the machine's."""
     limit = (jax.local_devices()[0].memory_stats() or {}).get("bytes_limit")
-    return limit or os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    return limit or machine_bytes()
 
 
 def _first_state(config: WanTrainConfig, checkpoints: TrainingCheckpoints, resume: bool) -> WanState:

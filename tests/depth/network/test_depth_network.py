@@ -11,6 +11,7 @@ from rein3d_jax.depth.network.network import estimate_depth
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.shell import RoomShell, meet_shell
 from rein3d_jax.geometry.sphere import azimuths, pixel_rays
+from rein3d_jax.networks.depth import depth_shapes
 
 TINY = DepthNetworkConfig(
     stem=4, channels=(4,) * 7, blocks=(1,) * 7, expand=2, horizon=8, heads=2, layers=1, decoder=(8, 8, 8, 8, 8)
@@ -45,14 +46,14 @@ def test_a_yaw_by_whole_strides_yaws_the_estimate(estimate, strides):
         np.testing.assert_allclose(after, jnp.roll(before, 32 * strides, axis=2), atol=1e-4)
 
 
-def test_it_exports_for_accelerators(depth_shapes):
+def test_it_exports_for_accelerators():
     shapes = depth_shapes(DepthNetworkConfig())
     rgb = jax.ShapeDtypeStruct((1, 128, 256, 3), jnp.float32)
     estimate = jax.jit(lambda parameters, rgb: estimate_depth(parameters, rgb, DepthNetworkConfig()))
     assert jax.export.export(estimate, platforms=["cuda", "tpu"])(shapes, rgb).mlir_module_serialized
 
 
-def test_the_shipped_sizes_stay_small(depth_shapes):
+def test_the_shipped_sizes_stay_small():
     assert 2 * sum(leaf.size for leaf in jax.tree.leaves(depth_shapes(DepthNetworkConfig()))) < 20e6  # bytes as float16
 
 
