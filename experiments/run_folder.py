@@ -77,7 +77,7 @@ class RunFolder:
         """(stage, what became of it), in the order in which they are made."""
         begun = (self.path / "config.toml").stat().st_mtime_ns
         restores = (f"restore-{index:02d}" for index in range(self.config.explore.trajectories))
-        for name in ("read", "lift", "explore", *restores, "refine"):
+        for name in ("read", "lift", "explore", "peel", *restores, "refine"):
             file = self.path / "stages" / f"{name}.npz"
             state = "waiting"
             if file.exists():

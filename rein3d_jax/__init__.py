@@ -9,8 +9,8 @@
     frame, _ = r3d.render(result.scene, camera, config=r3d.Stages().rasterize)
     r3d.write_splats("room.ply", result.scene)
 
-A stage is a package of its own, by name: r3d.depth, r3d.lift, r3d.explore, r3d.rasterize, r3d.restore, r3d.upsample,
-r3d.refine, r3d.evaluate. What is named here is imported when it is first asked for.
+A stage is a package of its own, by name: r3d.depth, r3d.lift, r3d.explore, r3d.peel, r3d.rasterize, r3d.restore,
+r3d.upsample, r3d.refine, r3d.evaluate. What is named here is imported when it is first asked for.
 """
 
 import importlib
@@ -33,9 +33,10 @@ _DOORS = {
     "Stages": "pipeline.stages",
     **dict.fromkeys(("Survey", "survey", "with_distance"), "pipeline.survey"),
     **dict.fromkeys(("Explored", "explore_and_restore"), "pipeline.explore_and_restore"),
+    "peel_scene": "pipeline.peel_scene",
     **dict.fromkeys(("collect_views", "refine_scene"), "pipeline.refine_scene"),
 }
-_STAGES = ("depth", "lift", "explore", "rasterize", "restore", "upsample", "refine", "evaluate")
+_STAGES = ("depth", "lift", "explore", "peel", "rasterize", "restore", "upsample", "refine", "evaluate")
 _ROOMS = ("conventions", "geometry", "rooms", *_STAGES)
 
 __all__ = ["__version__", *_DOORS, *_ROOMS]

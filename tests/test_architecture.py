@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 FILES = sorted(path for room in ("rein3d_jax", "experiments") for path in (ROOT / room).rglob("*.py"))
-STAGES = {"depth", "lift", "explore", "rasterize", "restore", "upsample", "refine", "evaluate", "rooms"}
+STAGES = {"depth", "lift", "explore", "peel", "rasterize", "restore", "upsample", "refine", "evaluate", "rooms"}
 GROUND = {"", "conventions", "errors", "settings"}  # "" is the package itself: its version
 MAX_LINES = 250
 NAMELESS = {"utils", "util", "helpers", "helper", "common", "misc"}

@@ -29,6 +29,7 @@ from rein3d_jax.explore.trajectories import radial_trajectories
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.networks.trained import read_network
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
+from rein3d_jax.pipeline.peel_scene import peel_scene
 from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene
 from rein3d_jax.pipeline.survey import Survey, lift_scene, room_background
 from rein3d_jax.restore import restorer
@@ -107,11 +108,17 @@ class Bench:
         paths, _ = self.once(config.explore, lambda: radial_trajectories(panorama, config=config.explore))
         background, knowing = self.once("background", lambda: room_background(panorama, config.restore))
         restore = restorer(config.restore, background, read_network(config.restore))
-        known, states, seconds = Survey(panorama, coarse, paths), [], lifting + knowing
+        known, states = Survey(panorama, coarse, paths), []
+        keys = jax.random.split(jax.random.key(config.seed))
+        scene, peeling = self.once(
+            (config.lift, config.explore, config.peel, config.restore, config.seed),
+            lambda: peel_scene(known, background, restore, keys[1], stages=config),
+        )
+        known, seconds = known.replace(coarse=scene), lifting + knowing + peeling
         for index in range(config.explore.trajectories):
             start = states[-1] if states else None
-            following = explore_and_restore(known, restore, jax.random.key(config.seed), stages=config, start=start)
-            key = (config.lift, config.explore, config.restore, config.seed, index)
+            following = explore_and_restore(known, restore, keys[0], stages=config, start=start)
+            key = (config.lift, config.explore, config.peel, config.restore, config.seed, index)
             state, spent = self.once(key, lambda following=following: next(following))
             states, seconds = [*states, state], seconds + spent
         return states, seconds

@@ -25,6 +25,7 @@ from rein3d_jax.networks.depth import SHIPPED_DEPTH, read_depth_network
 from rein3d_jax.networks.trained import files_digest, read_network, weights_fingerprint
 from rein3d_jax.networks.upsampler import read_upsampler, upsampler_fingerprint
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
+from rein3d_jax.pipeline.peel_scene import peel_scene
 from rein3d_jax.pipeline.reconstruct import ALL_PATHS, Reconstruction, joined
 from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene
 from rein3d_jax.pipeline.survey import Survey, lift_scene, room_background, with_distance
@@ -99,7 +100,7 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str, Lean]:
         "explore", job.settings("explore"), lambda: radial_trajectories(panorama, config=config.explore)
     )
     known = Survey(panorama, coarse, trajectories)
-    explored = list(_explored(job, known, jax.random.fold_in(key, 0)))
+    explored = list(_explored(job, known, key))
     scene, curves, stopped = job.stage(
         "refine", job.settings("refine"), lambda: _refined(job, known, explored, jax.random.fold_in(key, 1))
     )
@@ -119,14 +120,20 @@ def _explored(job: _Job, known: Survey, key: jax.Array) -> Iterator[Explored]:
     config, last = job.config, None
     background = room_background(known.panorama, config.restore)
     restore = restorer(config.restore, background, read_network(config.restore))
-    method = config.upsample.method
+    made_by = [job.settings("restore"), weights_fingerprint(config.restore), config.seed]
+    peel_key = jax.random.fold_in(key, 2)
+    scene = job.stage(
+        "peel",
+        [job.settings("peel"), *made_by],
+        lambda: peel_scene(known, background, restore, peel_key, stages=config),
+    )
+    peeled, method = known.replace(coarse=scene), config.upsample.method
     restore = then_upsample(restore, known.panorama, read_upsampler(method), config=config.upsample)
-    settings = [job.settings(stage) for stage in ("restore", "upsample", "rasterize")]
-    shared = [*settings, weights_fingerprint(config.restore), upsampler_fingerprint(method), config.seed]
+    shared = [*made_by, job.settings("upsample"), upsampler_fingerprint(method), job.settings("rasterize")]
     for index in range(config.explore.trajectories):
         if index and job.clock.explored():
             return
-        states = explore_and_restore(known, restore, key, stages=config, start=last)
+        states = explore_and_restore(peeled, restore, jax.random.fold_in(key, 0), stages=config, start=last)
         last = job.stage(f"restore-{index:02d}", [*shared, index], lambda states=states: next(states))
         yield last
 

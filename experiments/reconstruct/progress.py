@@ -8,7 +8,7 @@ from rich.progress import Progress as Bars
 
 from experiments.reconstruct.stage_store import Finished
 
-_STAGE_COST = {"read": 8, "lift": 5, "explore": 2, "restore": 16}  # in refinement steps, on a laptop's CPU
+_STAGE_COST = {"read": 8, "lift": 5, "explore": 2, "peel": 8, "restore": 16}  # in refinement steps, on a laptop's CPU
 
 
 class Progress:

@@ -30,6 +30,7 @@ def blank_stages(refine: RefineConfig) -> dict[str, Any]:
         # whether its distance was estimated, what was done to a given one, how it leaned
         "read": (_blank(Panorama, valid=bool), np.zeros(0, bool), "", _blank(Lean)),
         "lift": scene,
+        "peel": scene,
         "explore": _blank(Trajectories, counts=jnp.int32, overflow=jnp.int32),
         "restore": Explored(scene, video, number, jnp.zeros(0), number, number),
         "refine": (scene, snapshot.curves, ""),  # and why it ended

@@ -8,6 +8,7 @@ from flax import struct
 from rein3d_jax.conventions import EYE_HEIGHT
 from rein3d_jax.explore.trajectories import Trajectories
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
+from rein3d_jax.pipeline.peel_scene import peel_scene
 from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene
 from rein3d_jax.pipeline.stages import Stages
 from rein3d_jax.pipeline.survey import Survey, room_background, survey, with_distance
@@ -51,7 +52,7 @@ def reconstruct(
     upsampler: dict | None = None,
     camera_height: float = EYE_HEIGHT,
 ) -> Reconstruction:
-    """The scene of a panorama (h, 2 h): lifted, explored, restored and refined (paper Sec. 3).
+    """The scene of a panorama (h, 2 h): lifted, peeled, explored, restored and refined (paper Sec. 3).
 
     Distances that are not `valid` are completed. Where none is, `with_distance` estimates them beforehand; with
     stages.depth.method "shell" an empty box is fitted here, for a camera `camera_height` metres above the floor.
@@ -61,10 +62,12 @@ def reconstruct(
     """
     panorama, _ = with_distance(panorama, stages, camera_height=camera_height)
     known = survey(panorama, stages)
-    restore = restorer(stages.restore, room_background(panorama, stages.restore), network)
+    background = room_background(panorama, stages.restore)
+    restore = restorer(stages.restore, background, network)
+    explore_key, refine_key, peel_key = (jax.random.fold_in(key, i) for i in range(3))
+    peeled = known.replace(coarse=peel_scene(known, background, restore, peel_key, stages=stages))
     restore = then_upsample(restore, panorama, upsampler, config=stages.upsample)
-    explore_key, refine_key = (jax.random.fold_in(key, i) for i in range(2))
-    explored = list(explore_and_restore(known, restore, explore_key, stages=stages))
+    explored = list(explore_and_restore(peeled, restore, explore_key, stages=stages))
     views = collect_views(panorama, [state.video for state in explored], stages=stages)
     (last,) = deque(refine_scene(explored[-1].scene, views, panorama, refine_key, stages=stages), maxlen=1)
     return joined(known, explored, (last.scene, last.curves, last.stopped))

@@ -11,6 +11,7 @@ from rein3d_jax.explore.profile import ExploreConfig
 from rein3d_jax.geometry.poses import equirectangular_camera, rigid
 from rein3d_jax.geometry.sphere import world_from_camera_axes
 from rein3d_jax.lift import LiftConfig
+from rein3d_jax.peel import PeelConfig
 from rein3d_jax.rasterize import Buffers, RasterizeConfig, render
 from rein3d_jax.refine import RefineConfig
 from rein3d_jax.restore import RestoreConfig
@@ -27,6 +28,7 @@ class Stages(Settings):
     depth: DepthConfig = DepthConfig()
     lift: LiftConfig = LiftConfig()
     explore: ExploreConfig = ExploreConfig()
+    peel: PeelConfig = PeelConfig()
     rasterize: RasterizeConfig = RasterizeConfig()
     restore: RestoreConfig = RestoreConfig()
     upsample: UpsampleConfig = UpsampleConfig()
