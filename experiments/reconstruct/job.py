@@ -27,7 +27,7 @@ from rein3d_jax.networks.upsampler import read_upsampler, upsampler_fingerprint
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
 from rein3d_jax.pipeline.peel_scene import peel_scene
 from rein3d_jax.pipeline.reconstruct import ALL_PATHS, Reconstruction, joined
-from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene
+from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene, where_it_pays
 from rein3d_jax.pipeline.survey import Survey, lift_scene, room_background, with_distance
 from rein3d_jax.refine import Snapshot, evaluate_held_out
 from rein3d_jax.restore import restorer
@@ -140,8 +140,9 @@ def _explored(job: _Job, known: Survey, key: jax.Array) -> Iterator[Explored]:
 
 def _refined(job: _Job, known: Survey, explored: list[Explored], key: jax.Array):
     """(scene, curves, why it ended), a snapshot saved at each held-out evaluation."""
-    config, panorama = job.config, known.panorama
-    views = collect_views(panorama, [state.video for state in explored], stages=config)
+    panorama, videos = known.panorama, [state.video for state in explored]
+    config = where_it_pays(job.config, videos)
+    views = collect_views(panorama, videos, stages=config)
     unfinished: Snapshot | None = job.store.unfinished()
     start = explored[-1].scene if unfinished is None else unfinished
     for last in refine_scene(start, views, panorama, key, stages=config):

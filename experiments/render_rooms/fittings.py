@@ -6,7 +6,7 @@ import numpy as np
 
 from experiments.render_rooms.floorplan import Floorplan, Opening
 from experiments.render_rooms.polygon import edge_frame, rectangle
-from experiments.render_rooms.shell import Face
+from experiments.render_rooms.shell import Face, as_part
 
 _SIDES = ((0, 1, 2, 3), (7, 6, 5, 4), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
 
@@ -46,8 +46,8 @@ def draw_fittings(rng: np.random.Generator, plan: Floorplan, dressed: bool) -> l
     for opening in plan.openings:
         if opening.kind == "window":
             faces += _window(rng, plan, opening)
-            faces += _curtains(rng, plan, opening) if curtain else []
-            faces += _blind(rng, plan, opening) if blind else []
+            faces += as_part(_curtains(rng, plan, opening), "furniture") if curtain else []
+            faces += as_part(_blind(rng, plan, opening), "furniture") if blind else []
         elif opening.kind != "hole":
             faces += _casing(plan, opening) if rng.random() < 0.8 else []
             faces += _leaf(plan, opening) if opening.kind in ("door", "ajar") else []
@@ -155,9 +155,10 @@ def hang_picture(
     faces = frame.box("picture_frame", (a - w, 0.002, z - h), (a + w, 0.02, z + h))
     left, right = (frame.start + (a + s * (w - rim)) * frame.along + 0.0215 * frame.inward for s in (-1, 1))
     low, high = z - h + rim, z + h - rim
-    return [*faces, Face(name, np.array([[*right, low], [*left, low], [*left, high], [*right, high]]))]
+    inside = Face(name, np.array([[*right, low], [*left, low], [*left, high], [*right, high]]))
+    return as_part([*faces, inside], "flat")
 
 
 def lay_rug(centre: np.ndarray, size: tuple[float, float], yaw: float) -> list[Face]:
     """A flat rug on the floor."""
-    return prism("rug", rectangle(centre, size, yaw), 0.0, 0.012)
+    return as_part(prism("rug", rectangle(centre, size, yaw), 0.0, 0.012), "flat")

@@ -48,7 +48,7 @@ def plan_room(seed: int, catalog: Catalog, shots: ShotList) -> dict:
         "corners": plan.corners.tolist(), "ceiling": plan.ceiling.tolist(),
         "size": [*np.ptp(plan.corners, axis=0).tolist(), float(plan.ceiling_at(plan.corners).max())],
         "openings": [_opening_record(plan, opening) for opening in plan.openings],
-        "materials": materials, "faces": [{"material": f.material, "corners": f.corners.tolist()} for f in faces],
+        "materials": materials, "faces": [_face_record(face) for face in faces],
         "models": [_model_record(piece) for piece in pieces], "lights": lights, "world": world,
         "look": _draw_look(rng), "credits": _credits(pieces),
     }  # fmt: skip
@@ -132,6 +132,10 @@ def _opening_record(plan: Floorplan, opening: Opening) -> dict:
         "kind": opening.kind, "edge": opening.edge, "start": opening.start, "width": opening.width,
         "bottom": opening.bottom, "top": opening.top,
     }  # fmt: skip
+
+
+def _face_record(face: Face) -> dict:
+    return {"material": face.material, "corners": face.corners.tolist(), "part": face.part}
 
 
 def _model_record(piece: PlacedModel) -> dict:

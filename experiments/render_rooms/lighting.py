@@ -7,6 +7,7 @@ from experiments.render_rooms.fittings import prism
 from experiments.render_rooms.floorplan import Floorplan
 from experiments.render_rooms.groups import hanging_lamp, lamp_light
 from experiments.render_rooms.polygon import edge_frame, inside, polygon_area, rectangle, wall_clearance
+from experiments.render_rooms.shell import as_part
 
 _DAY_WORLDS = ("city", "forest", "sunrise", "courtyard", "sunset")
 
@@ -84,8 +85,9 @@ def _middle(plan: Floorplan) -> np.ndarray:
 def _bare_bulb(a: Arrangement, middle: np.ndarray) -> None:
     height = float(a.plan.ceiling_at(middle[None])[0])
     low = max(height - 0.6, min(1.9, height - 0.3))
-    a.faces += prism("lit", rectangle(middle, (0.2, 0.2), 0.3), low, low + 0.18)
-    a.faces += prism("metal", rectangle(middle, (0.015, 0.015), 0.3), low + 0.18, height)
+    bulb = prism("lit", rectangle(middle, (0.2, 0.2), 0.3), low, low + 0.18)
+    stem = prism("metal", rectangle(middle, (0.015, 0.015), 0.3), low + 0.18, height)
+    a.faces += as_part(bulb + stem, "furniture")
 
 
 def _panels(a: Arrangement) -> None:

@@ -1,6 +1,6 @@
 """A floorplan as faces: walls with their holes, floor, ceiling, and the analytic distance to them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,12 @@ class Face:
 
     material: str
     corners: np.ndarray  # (n, 3), counter-clockwise seen from inside the room
+    part: str = "room"  # or what a picture of the emptied room leaves out: "furniture", or "flat" on floor or wall
+
+
+def as_part(faces: list[Face], part: str) -> list[Face]:
+    """The same faces as a `part` of what the room holds."""
+    return [replace(face, part=part) for face in faces]
 
 
 def shell_faces(plan: Floorplan, names: dict[str, str]) -> list[Face]:

@@ -15,6 +15,9 @@ _FAR = 4.0  # times the median known distance: what is unknown and was placed be
 _ROWS = 64  # of the backdrop at most: what nobody saw has no detail
 _BEYOND = 1.05  # of what was seen: the backdrop stands behind it
 _MARGIN = 3  # pixels of the backdrop: beside the paths there is some room
+# Mean sRGB of what 312 panoramas of rendered rooms (experiments.render_rooms) show through windows, above and below.
+_SKY, _GROUND = 0.76, 0.54
+_MEMORY = 1.0  # radians over which what was seen ceases to tell what is beside it
 
 
 @struct.dataclass
@@ -41,8 +44,18 @@ def outside_of(panorama: Panorama, positions: jax.Array) -> OutsideLayer:
     while rgb.shape[0] > _ROWS and rgb.shape[0] % 2 == 0:
         rgb, share, glass = (halve(x) for x in (rgb, share, glass))
     shown = _shown(share > 0.5, 1 / jnp.maximum(glass, 1e-6), positions)
+    rgb = _forgetful(rgb, share > 0.5)
     distance = jnp.full(shown.shape, far)
     return OutsideLayer(Panorama(rgb, distance, jnp.ones(shown.shape, bool)), shown, jnp.any(window))
+
+
+def _forgetful(rgb: jax.Array, window: jax.Array) -> jax.Array:
+    """Colours (h, w, 3) that far from every window (h, w) become those of a day: what was seen tells less and less."""
+    rays = pixel_rays(*window.shape)
+    toward = jnp.max(jnp.where(window[None, None], jnp.einsum("ijc,hwc->ijhw", rays, rays), -1.0), axis=(2, 3))
+    remembered = jnp.exp(-jnp.arccos(jnp.clip(toward, -1.0, 1.0)) / _MEMORY)[..., None]
+    day = jnp.where(rays[..., 2:] > 0, _SKY, _GROUND)
+    return remembered * rgb + (1 - remembered) * day
 
 
 def _shown(window: jax.Array, glass: jax.Array, positions: jax.Array) -> jax.Array:

@@ -9,7 +9,7 @@ from rein3d_jax.conventions import EYE_HEIGHT
 from rein3d_jax.explore.trajectories import Trajectories
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
 from rein3d_jax.pipeline.peel_scene import peel_scene
-from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene
+from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene, where_it_pays
 from rein3d_jax.pipeline.stages import Stages
 from rein3d_jax.pipeline.survey import Survey, room_background, survey, with_distance
 from rein3d_jax.refine import Curves
@@ -68,7 +68,9 @@ def reconstruct(
     peeled = known.replace(coarse=peel_scene(known, background, restore, peel_key, stages=stages))
     restore = then_upsample(restore, panorama, upsampler, config=stages.upsample)
     explored = list(explore_and_restore(peeled, restore, explore_key, stages=stages))
-    views = collect_views(panorama, [state.video for state in explored], stages=stages)
+    videos = [state.video for state in explored]
+    stages = where_it_pays(stages, videos)
+    views = collect_views(panorama, videos, stages=stages)
     (last,) = deque(refine_scene(explored[-1].scene, views, panorama, refine_key, stages=stages), maxlen=1)
     return joined(known, explored, (last.scene, last.curves, last.stopped))
 

@@ -1,5 +1,6 @@
 """The scene with its guesses, refined: the views it is fitted to, how large it may be, what stays as it is."""
 
+import dataclasses
 from collections.abc import Iterator, Sequence
 
 import jax
@@ -35,6 +36,13 @@ def collect_views(panorama: Panorama, videos: Sequence[Video], *, stages: Stages
             yaw = float((index * _GOLDEN_ANGLE) % (jnp.pi / 2))
             parts.append(views_from_panorama(*frame, yaw=yaw, config=config))
     return join_views(*parts)
+
+
+def where_it_pays(stages: Stages, videos: Sequence[Video]) -> Stages:
+    """The stages, without steps of refinement where no path was restored: the input alone has nothing new to fit."""
+    if any(len(video.rgb) > 1 for video in videos):
+        return stages
+    return dataclasses.replace(stages, refine=dataclasses.replace(stages.refine, steps=0))
 
 
 def scene_extent(panorama: Panorama) -> float:

@@ -116,3 +116,10 @@ def test_a_network_s_estimate_is_metres_by_the_camera_s_height(panorama) -> None
     np.testing.assert_allclose(high.distance, 2 * low.distance, rtol=1e-5)  # float32
     with pytest.raises(r3d.InputError, match="read_depth_network"):
         r3d.with_distance(unknown, stages)
+
+
+def test_where_no_path_was_restored_nothing_is_refined(panorama):
+    explore = dataclasses.replace(STAGES.explore, min_revealed=0.99)
+    result = r3d.reconstruct(panorama, KEY, stages=dataclasses.replace(STAGES, explore=explore))
+    assert all(len(video.rgb) == 1 for video in result.videos)
+    assert len(result.curves.loss) == 0 and len(result.curves.psnr) == 1

@@ -1,4 +1,5 @@
 """Draw rooms that come as JSON lines on standard input: {"room": plan, "folder": target, "settings": {...}}.
+Where the settings list "emptied" parts, these are made for the panoramas that are there.
 
 Answers each with one line `done SECONDS PANORAMAS` or `failed REASON` on standard output."""
 
@@ -8,7 +9,7 @@ import sys
 import time
 import traceback
 
-from experiments.render_rooms.blender.room import draw_room
+from experiments.render_rooms.blender.room import draw_emptied, draw_room
 
 
 def serve_jobs() -> None:
@@ -19,7 +20,8 @@ def serve_jobs() -> None:
         job = json.loads(line)
         began = time.process_time()
         try:
-            count = draw_room(job["room"], job["folder"], job["settings"])
+            draw = draw_emptied if job["settings"].get("emptied") else draw_room
+            count = draw(job["room"], job["folder"], job["settings"])
             answers.write(f"done {time.process_time() - began:.1f} {count}\n")
         except Exception as error:  # the next room may well succeed; the caller counts
             traceback.print_exc()

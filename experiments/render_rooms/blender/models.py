@@ -19,6 +19,7 @@ def place_model(record: dict) -> None:
     thing = bpy.data.objects.new(record["key"], mesh)
     thing.location = record["place"]
     thing.rotation_euler = (0, 0, record["yaw"])
+    thing["part"], thing["model"] = "furniture", True
     thing.scale = [now / full for now, full in zip(record["size"], record["full_size"], strict=True)]
     bpy.context.scene.collection.objects.link(thing)
     for material in mesh.materials:

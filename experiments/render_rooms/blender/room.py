@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from experiments.render_rooms.blender.camera import set_camera, set_render
+from experiments.render_rooms.blender.exits import cast_exits
 from experiments.render_rooms.blender.lights import add_light, set_world
 from experiments.render_rooms.blender.materials import make_material
 from experiments.render_rooms.blender.models import place_model
@@ -29,6 +30,39 @@ def draw_room(plan: dict, folder: str, settings: dict) -> int:
         walk_gains = walk_gains or gains  # a walk keeps the first panorama's exposure
     _write_record(plan, folder)
     return len(plan["panoramas"])
+
+
+def draw_emptied(plan: dict, folder: str, settings: dict) -> int:
+    """The panoramas of `plan` again, as settings["emptied"] lists it: "exit" casts the rays of KKK_exit.npz, "empty"
+    renders KKK_empty, where the camera looks through the furniture, and light and shadows stay. settings["furnished"]
+    is the folder of the finished room.
+
+    What lies flat on floor or wall is not drawn at all: no light would reach the surface below it. The pictures are
+    developed with the `gains` that each panorama brings, so they fit the furnished ones."""
+    empty_scene()
+    build_room(plan)
+    os.makedirs(folder, exist_ok=True)
+    if "exit" in settings["emptied"]:
+        _write_exits(plan, folder, settings["furnished"])
+    if "empty" in settings["emptied"]:
+        _draw_without_furniture(plan, folder, settings)
+    return len(plan["panoramas"])
+
+
+def _write_exits(plan: dict, folder: str, furnished: str) -> None:
+    for panorama in plan["panoramas"]:
+        distance = np.load(os.path.join(furnished, panorama["name"] + ".npz"))["distance"]
+        leave = cast_exits(panorama, distance)["exit"]
+        np.savez_compressed(os.path.join(folder, panorama["name"] + "_exit.npz"), exit=leave)
+
+
+def _draw_without_furniture(plan: dict, folder: str, settings: dict) -> None:
+    for thing in bpy.context.scene.objects:
+        thing.visible_camera = thing.visible_camera and thing.get("part") != "furniture"
+        thing.hide_render = thing.get("part") == "flat"
+    set_render(settings["samples"], settings["bounces"], plan["seed"])
+    for panorama in plan["panoramas"]:
+        _take(panorama, plan["look"], os.path.join(folder, panorama["name"] + "_empty"), panorama["gains"])
 
 
 def _take(panorama: dict, look: dict, stem: str, gains: tuple | None) -> tuple:
@@ -57,11 +91,12 @@ def empty_scene() -> None:
 
 def build_room(plan: dict) -> None:
     """All of a plan's faces, models, lights and its world."""
-    by_name: dict[str, list] = {}
+    grouped: dict[tuple[str, str], list] = {}
     for face in plan["faces"]:
-        by_name.setdefault(face["material"], []).append(face["corners"])
-    for name, faces in by_name.items():
-        _add_faces(name, faces, make_material(name, plan["materials"][name]))
+        grouped.setdefault((face["material"], face["part"]), []).append(face["corners"])
+    materials = {name: make_material(name, plan["materials"][name]) for name in {name: None for name, _ in grouped}}
+    for (name, part), faces in grouped.items():
+        _add_faces(name, faces, materials[name])["part"] = part
     for record in plan["models"]:
         place_model(record)
     for light in plan["lights"]:
@@ -69,8 +104,8 @@ def build_room(plan: dict) -> None:
     set_world(plan["world"])
 
 
-def _add_faces(name: str, faces: list, material: bpy.types.Material) -> None:
-    """One mesh of all faces of a material, with metres as texture coordinates."""
+def _add_faces(name: str, faces: list, material: bpy.types.Material) -> bpy.types.Object:
+    """One mesh of faces of a material, with metres as texture coordinates."""
     mesh = bpy.data.meshes.new(name)
     corners = [corner for face in faces for corner in face]
     ends = np.cumsum([len(face) for face in faces])
@@ -83,7 +118,9 @@ def _add_faces(name: str, faces: list, material: bpy.types.Material) -> None:
     if name.startswith(("picture", "mirror")) and name != "picture_frame":
         layer.data.foreach_set("uv", np.array([[[1, 0], [0, 0], [0, 1], [1, 1]]] * len(faces), np.float32).ravel())
     mesh.materials.append(material)
-    bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
+    thing = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(thing)
+    return thing
 
 
 def _metres_on_plane(corners: np.ndarray) -> np.ndarray:

@@ -16,11 +16,10 @@ _FAR_AWAY = 100.0  # metres, of what has no distance
 _FAR_ONLY = 0.1  # share of the examples that have but the fill that needs no shell
 
 
-def augment(key: jax.Array, example: Example, *, darkest: float = _DARKEST) -> Example:
-    """The example (t, h, w) as another room and another camera might have made it; places that the anchor does not see
-    lack up to `darkest` nepers of light more, 0 where the light is true."""
+def augment(key: jax.Array, example: Example) -> Example:
+    """The example (t, h, w) as another room and another camera might have made it."""
     yaw, flip, tone, fill, shade = jax.random.split(key, 5)
-    example = shaded(example, darkest * jax.random.uniform(shade)) if darkest else example
+    example = shaded(example, _DARKEST * jax.random.uniform(shade))
     columns = jax.random.randint(yaw, (), 0, example.clip.alpha.shape[-1])
     example = yawed(example, columns)
     mirror = jax.random.bernoulli(flip)

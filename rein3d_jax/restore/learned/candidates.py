@@ -29,7 +29,7 @@ def clip_of(video: Video, *, observed: float, background: Background | None) -> 
     stands in for those by the room's shell. One program a frame: clips differ in length."""
     anchor = None if background is None else Anchor(background, video.distance[0], video.world_from_camera[0])
     frames = zip(video.rgb, video.distance, video.alpha >= observed, video.world_from_camera, strict=True)
-    filled = [frame_candidates(*frame, anchor) for frame in frames]
+    filled = [_candidates(*frame, anchor) for frame in frames]
     rgb, distance = (jnp.stack(part) for part in zip(*filled, strict=True))
     return Clip(video.rgb, video.alpha, video.distance, rgb, distance, positions(video.world_from_camera))
 
@@ -40,7 +40,7 @@ def positions(world_from_camera: jax.Array) -> jax.Array:
     return jnp.matmul(moved, world_from_panorama(world_from_camera[0]), precision=jax.lax.Precision.HIGHEST)
 
 
-def frame_candidates(rgb, distance, known, pose, anchor: Anchor | None) -> tuple[jax.Array, jax.Array]:
+def _candidates(rgb, distance, known, pose, anchor: Anchor | None):
     """Fills (h, w, CANDIDATES, 3) and their metres (h, w, CANDIDATES) of a frame."""
     far = fill_from_far_side(rgb, distance, known)
     shell = openings = far

@@ -28,7 +28,6 @@ class Example:
     clip: Clip
     clean_rgb: jax.Array  # (..., t, h, w, 3) sRGB
     clean_distance: jax.Array  # (..., t, h, w) metres, 0 where unknown
-    counts: jax.Array | None = None  # (..., t, h, w) in [0, 1], how much a pixel counts; None: all do
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,6 @@ def restoration_loss(predicted: jax.Array, example: Example, config: LossConfig)
 
     Divide after both are summed over the whole batch, and a batch in parts has the gradient of the whole."""
     wanted, weights = clean_residual(example), pixel_weights(example.clip.alpha, config)
-    weights = weights if example.counts is None else weights * example.counts
     mine, fills = (_weighted(error, weights, config) for error in (predicted - wanted, wanted))
     floor = _FLOOR * jnp.sum(weights, axis=(1, 2, 3)) + 1e-3
     return jnp.sum((mine + floor) / (fills + floor)), jnp.float32(len(weights))

@@ -91,17 +91,3 @@ def _enter_opening(carry, openings: Openings, index: int, origin: Vector, ray: V
 def point_at(origin: Vector, ray: Vector, distance: jax.Array) -> Vector:
     """Point origin + distance ray."""
     return tuple(o + d for o, d in zip(origin, scale(ray, distance), strict=True))
-
-
-def emptied(room: Room) -> Room:
-    """The room without what stands in it."""
-    solids_by_name = {name: getattr(room, name) for name in ("boxes", "cylinders", "ellipsoids")}
-    none = jnp.int32(0)
-    return room.replace(**{name: solids.replace(count=none, casters=none) for name, solids in solids_by_name.items()})
-
-
-def room_from_world(room: Room) -> jax.Array:
-    """Rotation (3, 3) from the world's axes to the room's."""
-    c, s, nothing = jnp.cos(room.yaw), jnp.sin(room.yaw), jnp.zeros_like(room.yaw)
-    rows = [[c, s, nothing], [-s, c, nothing], [nothing, nothing, nothing + 1]]
-    return jnp.stack([jnp.stack(row) for row in rows])

@@ -8,7 +8,7 @@ from jax import lax
 from rein3d_jax.geometry.colour import srgb_from_linear
 from rein3d_jax.geometry.sphere import pixel_rays, world_from_panorama
 from rein3d_jax.rooms.model import Room, TracedPanorama
-from rein3d_jax.rooms.tracing.nearest import SHELL_FACES, emptied, room_from_world
+from rein3d_jax.rooms.tracing.nearest import SHELL_FACES
 from rein3d_jax.rooms.tracing.outside import outside
 from rein3d_jax.rooms.tracing.pattern import joints, reflectance
 from rein3d_jax.rooms.tracing.shade import gather_texture, irradiance, pixel_footprint
@@ -25,16 +25,13 @@ _FRAME = 0.06  # metres: the bars between panes and panels
 _BAR_SHADE = 0.75  # of a door's panels against its bars
 
 
-def trace(
-    room: Room, world_from_camera: jax.Array, height: int, *, samples: int = 1, things: bool = True
-) -> TracedPanorama:
+def trace(room: Room, world_from_camera: jax.Array, height: int, *, samples: int = 1) -> TracedPanorama:
     """Equirectangular panoramas of height x 2 height pixels from poses (..., 4, 4), all inside the room's free space.
 
     `samples` x `samples` rays a pixel, averaged as displayed, smooth the silhouettes; textures are smooth already.
     Distance, normal and object id are those of the ray through the pixel's centre, whatever `samples` is; the distance
-    is 0 on the windows of a room whose windows are open. Without `things` rays pass through all that stands in the
-    room, as if it were not there, but its shadows stay. Pure; works under jit (all but room and pose static) and vmap,
-    on any platform. Every pose costs the same.
+    is 0 on the windows of a room whose windows are open. Pure; works under jit (height and samples static) and vmap, on
+    any platform. Every pose costs the same.
     """
     assert world_from_camera.shape[-2:] == (4, 4), world_from_camera.shape
     assert samples >= 1, samples
@@ -43,38 +40,36 @@ def trace(
     # Frame by frame: its arrays stay in the cache. Channels leave the loop apart and are stacked outside: XLA would
     # compute all that they share once for each (114 ms a panorama, not 45).
     colours, distance, normal, objects = lax.map(
-        lambda pose: _frame(room, table, pose, height, samples, things), world_from_camera.reshape(-1, 4, 4)
+        lambda pose: _frame(room, table, pose, height, samples), world_from_camera.reshape(-1, 4, 4)
     )
     view = TracedPanorama(jnp.stack(colours, axis=-1), distance, jnp.stack(normal, axis=-1), objects)
     return jax.tree.map(lambda x: x.reshape(*leading, *x.shape[1:]), view)
 
 
-def _frame(room: Room, table: SurfaceTable, pose: jax.Array, height: int, samples: int, things: bool):
+def _frame(room: Room, table: SurfaceTable, pose: jax.Array, height: int, samples: int):
     """(rgb as a vector, distance, normal as a vector, object id), each (h, 2 h)."""
     origin, ray = _rays(room, pose, height)
-    met = room if things else emptied(room)
-    hits = meet_surfaces(met, table, origin, ray)
+    hits = meet_surfaces(room, table, origin, ray)
     normal = rotate_left(hits.normal, (jnp.cos(room.yaw), jnp.sin(room.yaw)))
     if samples == 1:
         colour = _colour(room, table, hits, ray, pose, height)
     else:
-        colour = _oversampled(room, met, table, pose, height, samples)
+        colour = _oversampled(room, table, pose, height, samples)
     seen_through = room.open_windows & _is_window(room, hits) & _on_leaf(room, hits)
     return colour, jnp.where(seen_through, 0.0, hits.distance), normal, table.object[hits.index].astype(jnp.int32)
 
 
-def _oversampled(room: Room, met: Room, table: SurfaceTable, pose: jax.Array, height: int, samples: int) -> Vector:
-    """Colours (h, 2 h) of finer rays, which meet `met`."""
+def _oversampled(room: Room, table: SurfaceTable, pose: jax.Array, height: int, samples: int) -> Vector:
     fine = height * samples
     origin, ray = _rays(room, pose, fine)
-    hits = meet_surfaces(met, table, origin, ray)
+    hits = meet_surfaces(room, table, origin, ray)
     colour = _colour(room, table, hits, ray, pose, fine)
     return tuple(x.reshape(height, samples, 2 * height, samples).mean((1, 3)) for x in colour)
 
 
 def _rays(room: Room, pose: jax.Array, height: int) -> tuple[Vector, Vector]:
     """Origin and unit rays (h, 2 h), in the room's axes."""
-    position = jnp.matmul(pose[:3, 3], room_from_world(room).T, precision="highest")
+    position = jnp.matmul(pose[:3, 3], _room_from_world(room).T, precision="highest")
     return components(position), _in_room(room, pose, components(pixel_rays(height, 2 * height)))
 
 
@@ -92,9 +87,15 @@ def _steps(room: Room, pose: jax.Array, height: int) -> tuple[Vector, Vector]:
 
 def _in_room(room: Room, pose: jax.Array, camera: Vector) -> Vector:
     """Vectors (h, w) in the room's axes, of vectors in a panorama's own, whose +X is its centre column."""
-    rotation = jnp.matmul(room_from_world(room), world_from_panorama(pose), precision="highest")
+    rotation = jnp.matmul(_room_from_world(room), world_from_panorama(pose), precision="highest")
     rows = [[rotation[i, j] for j in range(3)] for i in range(3)]
     return tuple(x * camera[0] + y * camera[1] + z * camera[2] for x, y, z in rows)
+
+
+def _room_from_world(room: Room) -> jax.Array:
+    c, s, nothing = jnp.cos(room.yaw), jnp.sin(room.yaw), jnp.zeros_like(room.yaw)
+    rows = [[c, s, nothing], [-s, c, nothing], [nothing, nothing, nothing + 1]]
+    return jnp.stack([jnp.stack(row) for row in rows])
 
 
 def _colour(room: Room, table: SurfaceTable, hits: SurfaceHits, ray: Vector, pose: jax.Array, height: int) -> Vector:

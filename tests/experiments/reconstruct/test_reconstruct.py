@@ -44,7 +44,7 @@ def test_writes_everything_a_user_was_promised(finished):
 def test_metrics_say_what_was_measured(finished):
     metrics = json.loads((finished / "metrics.json").read_text())
     seconds = metrics["seconds"]
-    assert {"read", "lift", "explore", "restore", "refine", "write", "total"} == set(seconds)
+    assert {"read", "lift", "explore", "peel", "restore", "refine", "write", "total"} == set(seconds)
     assert seconds["total"] >= max(v for k, v in seconds.items() if k != "total")
     assert metrics["count"]["pixels"] == metrics["count"]["lift"] == 64 * 128
     assert metrics["peak_bytes"] > 0 and metrics["overflow"] == 0
@@ -95,7 +95,7 @@ def test_saved_config_is_the_config(finished, recipe):
     assert "jax" in (finished / "config.toml").read_text().splitlines()[0]
 
 
-STAGES = ["read", "lift", "explore", "restore-00", "restore-01", "refine"]
+STAGES = ["read", "lift", "explore", "peel", "restore-00", "restore-01", "refine"]
 
 
 def resume(output, recipe, *more):
@@ -107,9 +107,9 @@ def resume(output, recipe, *more):
     return [name for name in STAGES if after[name] != before.get(name)]
 
 
-@pytest.mark.parametrize("finished_stages", [1, 4, 5])
+@pytest.mark.parametrize("finished_stages", [1, 5, 6])
 def test_killed_and_resumed_gives_the_same_bytes(finished, recipe, tmp_path, finished_stages):
-    """Killed after 1 (read), 4 (one trajectory restored) or 5 stages (both): only the rest is made again."""
+    """Killed after 1 (read), 5 (one trajectory restored) or 6 stages (both): only the rest is made again."""
     output = tmp_path / "room"
     shutil.copytree(finished / "stages", output / "stages")
     for name in STAGES[finished_stages:]:

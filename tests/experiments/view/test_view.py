@@ -98,7 +98,7 @@ def test_other_methods_and_other_names_are_refused(folder):
 
 def begun_again(folder, stages):
     """The folder of a job that has just finished its first `stages`."""
-    names = ["read", "lift", "explore", "restore-00", "restore-01"]
+    names = ["read", "lift", "explore", "peel", "restore-00", "restore-01"]
     (folder / "metrics.json").unlink()
     for name in names[stages:]:
         (folder / "stages" / f"{name}.npz").unlink()
@@ -108,13 +108,13 @@ def begun_again(folder, stages):
 
 
 def test_a_running_job_shows_how_far_it_is(folder):
-    begun_again(folder, stages=4)
+    begun_again(folder, stages=5)
     with serving(folder) as ask:
         page = ask("/")[2].decode()
         html5lib.HTMLParser(strict=True).parse(page)
         states = re.findall(r"<td>([^<]*)</td><td>([^<]*)</td>", page)
-        assert states == [("read", "done"), ("lift", "done"), ("explore", "done"), ("restore-00", "done"),
-                          ("restore-01", "waiting"), ("refine", "waiting")]  # fmt: skip
+        assert states == [("read", "done"), ("lift", "done"), ("explore", "done"), ("peel", "done"),
+                          ("restore-00", "done"), ("restore-01", "waiting"), ("refine", "waiting")]  # fmt: skip
         assert 'http-equiv="refresh"' in page and "<polyline" not in page
         scenes = json.loads(DATA.search(ask("/viewer")[2].decode())[1])["scenes"]
         assert [scene["name"] for scene in scenes] == ["Coarse"]
@@ -132,8 +132,8 @@ def test_a_job_of_another_recipe_over_a_finished_one_is_not_finished(folder):
 
 
 def test_before_there_is_a_scene_there_is_no_viewer(folder):
-    begun_again(folder, stages=4)
-    for name in ("lift", "explore", "restore-00"):
+    begun_again(folder, stages=5)
+    for name in ("lift", "explore", "peel", "restore-00"):
         (folder / "stages" / f"{name}.npz").unlink()
     with serving(folder) as ask:
         assert "/viewer" not in ask("/")[2].decode()
@@ -141,7 +141,7 @@ def test_before_there_is_a_scene_there_is_no_viewer(folder):
 
 
 def test_refinement_so_far_is_drawn_and_shown(folder):
-    begun_again(folder, stages=5)
+    begun_again(folder, stages=6)
     snapshot = blank_snapshot(open_run(folder).config.refine)
     values = {"loss": [0.5, 0.2], "psnr": [20.0, 22.0], "count": [100.0, 90.0]}
     curves = snapshot.curves.replace(**{name: np.array([[0.0, a], [50.0, b]]) for name, (a, b) in values.items()})
