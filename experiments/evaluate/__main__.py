@@ -27,7 +27,7 @@ import jax
 from experiments.command import CommandParser
 from experiments.compiled_programs import forget_when_many
 from experiments.config import load_config
-from experiments.evaluate.chart import chart
+from experiments.evaluate.chart import chart, check_charts
 from experiments.evaluate.methods import REFINED, chosen_methods, recipe_of
 from experiments.evaluate.protocols import NO_TRUTH, PROTOCOLS, Tools
 from experiments.evaluate.results import line, stored_outcome, table
@@ -59,6 +59,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _run(options) -> None:
     if options.rooms is not None:
+        if options.chart is not None:
+            check_charts()  # minutes before there is anything to draw
         _evaluate(options)
     elif options.chart is None:
         raise InputError("give --rooms and --json to measure, or --chart and result files to draw")

@@ -1,5 +1,6 @@
 """Charts of accuracy against cost, of every recipe and method measured on the same rooms: a PNG, and its points."""
 
+import importlib.util
 import io
 import json
 from dataclasses import asdict, dataclass
@@ -48,10 +49,17 @@ class Point:
     on_front: bool = False
 
 
+def check_charts() -> None:
+    """Raises InputError without matplotlib: to be asked before the long part."""
+    if importlib.util.find_spec("matplotlib") is None:
+        raise InputError('--chart draws with matplotlib: pip install "rein3d-jax[bench]"')
+
+
 def chart(files: list[Path], picture: Path, points: Path | None = None) -> None:
     """Draws the result files into `picture`, PNG, and writes what it shows into `points`, JSON. Raises InputError
-    without matplotlib, and as chart_points does."""
+    as check_charts and chart_points do."""
     rooms, panels = chart_points(files)
+    check_charts()
     write_bytes(picture, _png(panels, len(rooms)))
     if points is not None:
         table = [{**asdict(panel), "points": [asdict(point) for point in shown]} for panel, shown in panels]
@@ -94,10 +102,8 @@ def _points(panel: Panel, results: list[dict]) -> list[Point]:
 
 
 def _png(panels: list[tuple[Panel, list[Point]]], rooms: int) -> bytes:
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise InputError('--chart draws with matplotlib: pip install "rein3d-jax[bench]"') from error
+    from matplotlib.figure import Figure
+
     rows = -(-len(panels) // 2)
     figure = Figure(figsize=(15, 4.6 * rows), layout="constrained")
     labels = {point.label: None for _, points in panels for point in points}

@@ -52,8 +52,14 @@ def outside_of(panorama: Panorama, positions: jax.Array) -> OutsideLayer:
 def _forgetful(rgb: jax.Array, window: jax.Array) -> jax.Array:
     """Colours (h, w, 3) that far from every window (h, w) become those of a day: what was seen tells less and less."""
     rays = pixel_rays(*window.shape)
-    toward = jnp.max(jnp.where(window[None, None], jnp.einsum("ijc,hwc->ijhw", rays, rays), -1.0), axis=(2, 3))
-    remembered = jnp.exp(-jnp.arccos(jnp.clip(toward, -1.0, 1.0)) / _MEMORY)[..., None]
+
+    def toward(row):
+        """Cosine (w,) of the angle to the nearest window; row by row, since all at once are 270 MB."""
+        cosines = jnp.matmul(row, rays.reshape(-1, 3).T, precision="highest")
+        return jnp.max(jnp.where(window.ravel(), cosines, -1.0), axis=-1)
+
+    angle = jnp.arccos(jnp.clip(jax.lax.map(toward, rays), -1.0, 1.0))
+    remembered = jnp.exp(-angle / _MEMORY)[..., None]
     day = jnp.where(rays[..., 2:] > 0, _SKY, _GROUND)
     return remembered * rgb + (1 - remembered) * day
 

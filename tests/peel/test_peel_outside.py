@@ -27,7 +27,10 @@ def test_more_places_show_more(with_window):
     assert (more | ~one).all() and more.sum() > one.sum()
 
 
-def test_it_goes_on_from_what_was_seen(with_window):
+def test_it_goes_on_from_what_was_seen_and_forgets_it(with_window):
     outside = outside_of(with_window, HERE)
-    np.testing.assert_allclose(outside.panorama.rgb, 1.0, atol=1e-5)  # one colour was seen: float32 means of it
+    rgb, row = np.asarray(outside.panorama.rgb)[..., 0], 14
+    np.testing.assert_allclose(rgb[~np.asarray(with_window.valid)], 1.0, atol=1e-3)  # white; arccos near 1 in float32
+    beside = rgb[row, 47:62]  # to the right of the window, above the horizon
+    assert (np.diff(beside) < 0).all() and (beside >= 0.76 - 1e-6).all()  # towards a sky's mean
     assert (outside.panorama.distance > 20.0).all()  # behind what was seen

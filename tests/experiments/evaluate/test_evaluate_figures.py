@@ -107,6 +107,12 @@ def test_chart(tmp_path):
     assert {point["label"] for point in by_gaussians["points"]} == on_front and table["rooms"] == ["a", "b"]
 
 
+def test_a_chart_that_cannot_be_drawn_is_refused_before_anything_is_measured(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    asked = ["--rooms", str(tmp_path / "missing"), "--json", str(tmp_path / "out.json"), "--chart"]
+    assert evaluate.main(asked) == 2 and "matplotlib" in capsys.readouterr().err
+
+
 def test_a_chart_compares_the_same_rooms(tmp_path, capsys):
     files = [result(tmp_path / "one.json"), result(tmp_path / "two.json", rooms=("a",))]
     assert evaluate.main(["--chart", *files]) == 2 and "different rooms" in capsys.readouterr().err
