@@ -34,7 +34,7 @@ def run_report(run: Run, pictures: Pictures, metrics: dict) -> Report:
         facts += [(f"PSNR, {name}", f"{metrics['quality'][name]['psnr']:.2f} dB") for name in ("coarse", "refined")]
     return Report(
         title="Your room in 3D",
-        summary="One panorama, lifted to 3D, explored, its hidden parts guessed, and everything refined together. "
+        summary="One panorama, lifted to 3D; what things hide was guessed, from paths through the room too where they found holes. "
         "Open viewer.html to walk through it, or scene.ply in any Gaussian splat viewer; flythrough.mp4 walks the "
         "paths below.",
         facts=tuple(facts),
@@ -186,6 +186,10 @@ def room_plan(trajectories: Trajectories, explore: ExploreConfig, views: list[Vi
 
 
 def _charts(curves: Curves) -> tuple[Chart, ...]:
+    """None where nothing was refined."""
+    if not len(curves.psnr):
+        return ()
+
     def series(points, label):
         return (Series(label, points[:, 0], points[:, 1]),)
 

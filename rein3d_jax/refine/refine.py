@@ -18,6 +18,7 @@ from rein3d_jax.refine.views import Views, camera_of
 
 _GROW = {"default": densify, "mcmc": relocate}
 ALL_STEPS, PLATEAU = "all steps taken", "held-out views stopped improving"
+NO_STEPS = "no steps were to be taken"
 
 
 @struct.dataclass
@@ -40,12 +41,16 @@ def refine(
     take_step=take_step,
 ) -> Iterator[Snapshot]:
     """The snapshots after each held-out evaluation and each step, from `snapshot` (`first_snapshot`'s, or any that was
-    saved) to the last, whose `stopped` says why it ended; a caller with a clock breaks off earlier.
+    saved) to the last, whose `stopped` says why it ended; without steps that one alone, not evaluated. A caller with a
+    clock breaks off earlier.
 
     `views` (m, ...): every `held_out_every`-th is never trained on. The same key gives the same bytes, also when it
     goes on from a snapshot. `take_step` takes a step: step.py's, or one that shares it out over devices. Raises
     InputError where no view is left to train on.
     """
+    if config.steps == 0:
+        yield snapshot.replace(stopped=NO_STEPS)
+        return
     schedule = _schedule(key, views.rgb.shape[0], config)
     while snapshot.step < config.steps:
         if snapshot.step % config.evaluate_every == 0 and not snapshot.evaluated:

@@ -60,7 +60,9 @@ def first_snapshot(
     state = initial_state(with_sh_degree(gaussians, config.sh_degree), config, extent=extent, fixed=fixed)
     chosen = np.unique(np.linspace(0, views.rgb.shape[0] - 1, _ALLOCATED_BY).astype(int))
     cameras = [camera_of(views, int(i)) for i in chosen]
-    buffers = allocate(join_parameters(state.parameters, state.alive), cameras, config=raster, slack=1.25)
+    # Without steps nothing is rendered.
+    scene = join_parameters(state.parameters, state.alive)
+    buffers = allocate(scene, cameras, config=raster, slack=1.25) if config.steps else jnp.zeros(4, jnp.int32)
     rows, total = np.zeros((0, 2)), np.zeros(())
     return Snapshot(state, jnp.array(buffers), Curves(rows, rows, rows, total, total, total), "")
 

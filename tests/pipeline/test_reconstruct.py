@@ -122,4 +122,5 @@ def test_where_no_path_was_restored_nothing_is_refined(panorama):
     explore = dataclasses.replace(STAGES.explore, min_revealed=0.99)
     result = r3d.reconstruct(panorama, KEY, stages=dataclasses.replace(STAGES, explore=explore))
     assert all(len(video.rgb) == 1 for video in result.videos)
-    assert len(result.curves.loss) == 0 and len(result.curves.psnr) == 1
+    assert len(result.curves.loss) == len(result.curves.psnr) == 0
+    assert int(result.scene.alive.sum()) == int(result.coarse.alive.sum())  # an empty room: nothing is hidden

@@ -8,7 +8,7 @@ import pytest
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.refine import RefineConfig, ViewsConfig, blank_snapshot, evaluate_held_out, refine
-from rein3d_jax.refine.refine import ALL_STEPS, PLATEAU, _batches
+from rein3d_jax.refine.refine import ALL_STEPS, NO_STEPS, PLATEAU, _batches
 
 KEY = jax.random.key(0)
 
@@ -94,7 +94,7 @@ def test_batches_go_round_all_training_views() -> None:
 def test_no_step_changes_nothing(toy, fit) -> None:
     _, views, start = toy()
     (last,) = fit(start, views, RefineConfig(steps=0, sh_degree=1, views=ViewsConfig(held_out_every=4)))
-    assert same_bytes(last.scene, start) and len(last.curves.loss) == 0 and last.stopped == ALL_STEPS
+    assert same_bytes(last.scene, start) and len(last.curves.loss) == 0 and last.stopped == NO_STEPS
 
 
 def test_a_single_view_is_refused(toy, fit, config) -> None:
