@@ -34,8 +34,8 @@ def run_report(run: Run, pictures: Pictures, metrics: dict) -> Report:
         facts += [(f"PSNR, {name}", f"{metrics['quality'][name]['psnr']:.2f} dB") for name in ("coarse", "refined")]
     return Report(
         title="Your room in 3D",
-        summary="One panorama, lifted to 3D, and what things hide in it guessed; where paths through the room found holes "
-        "all the same, these were restored, and everything refined together. "
+        summary="One panorama, lifted to 3D, and what things hide in it guessed; where paths through the room found "
+        "holes all the same, these were restored, and everything refined together. "
         "Open viewer.html to walk through it, or scene.ply in any Gaussian splat viewer; flythrough.mp4 walks the "
         "paths below.",
         facts=tuple(facts),
