@@ -170,6 +170,7 @@ def run_folder(rooms, tmp_path_factory):
     stage("read", (panorama, np.array([False]), "", unasked_lean()))
     stage("lift", coarse)
     stage("explore", paths)
+    stage("peel", coarse)
     for index, count in enumerate(np.asarray(paths.counts)):
         poses = np.asarray(paths.world_from_camera[index, :count])
         truth = [seen(pose[:3, 3], np.asarray(rays_at(pose, 64, 128))) for pose in poses]

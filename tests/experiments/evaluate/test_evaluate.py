@@ -60,7 +60,7 @@ def test_the_main_jobs_scene_is_measured_like_the_others_and_not_made_twice(reci
         assert refined["gaussians"]["mean"] > 0 and refined["seconds"]["mean"] > 0
         assert 0 < refined["coverage"]["mean"] <= 1
     novel = result["novel_views"]
-    assert novel["refined"]["psnr_hole"]["mean"] > novel["coarse"]["psnr_hole"]["mean"]  # a fill, where that has none
+    assert novel["refined"]["coverage"]["mean"] > novel["coarse"]["coverage"]["mean"]  # a fill, where that has none
 
 
 def test_layout(finished):

@@ -70,6 +70,7 @@ def test_seconds_that_are_spent_end_both_stages_and_leave_a_whole_run(recipe, tm
 
 
 def test_paths_that_reveal_too_little_are_left_out(recipe, tmp_path):
-    metrics = run(recipe, tmp_path / "run", "explore.min_revealed=0.99", "refine.densification=none")
+    unpeeled = ("peel.room=false", "peel.outside=false")
+    metrics = run(recipe, tmp_path / "run", "explore.min_revealed=0.99", "refine.densification=none", *unpeeled)
     assert metrics["paths"] and not any(path["restored"] for path in metrics["paths"])
     assert metrics["count"]["refined"] == metrics["count"]["lift"]
