@@ -7,7 +7,7 @@ well it renders where it was restored, and would stand in the way everywhere els
 import jax
 import jax.numpy as jnp
 
-from rein3d_jax.geometry.sphere import pixels_from_rays
+from rein3d_jax.geometry.sphere import holding_pixels, pixels_from_rays
 from rein3d_jax.scene import Panorama
 
 _STEPS = 24  # places tried along a ray, 6 % apart; even, so that the guess itself is one of them
@@ -23,11 +23,7 @@ def relative_distance(panorama: Panorama, points: jax.Array) -> jax.Array:
 
 def _in_direction(image: jax.Array, points: jax.Array) -> jax.Array:
     """The pixel (...) of a panorama's image (h, w) that shows points (..., 3)."""
-    height, width = image.shape
-    u, v = pixels_from_rays(points, height, width)
-    column = jnp.clip(jnp.floor(u).astype(jnp.int32), 0, width - 1)
-    row = jnp.clip(jnp.floor(v).astype(jnp.int32), 0, height - 1)
-    return image[row, column]
+    return image[holding_pixels(*pixels_from_rays(points, *image.shape), *image.shape)]
 
 
 @jax.jit

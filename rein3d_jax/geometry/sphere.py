@@ -39,6 +39,12 @@ def pixels_from_rays(rays: jax.Array, height: int, width: int) -> tuple[jax.Arra
     return (azimuth / (2 * jnp.pi) + 0.5) * width, (0.5 - latitude / jnp.pi) * height
 
 
+def holding_pixels(u: jax.Array, v: jax.Array, height: int, width: int) -> tuple[jax.Array, jax.Array]:
+    """(row, column) int of the pixels that hold the places u in [0, width], v in [0, height]."""
+    row, column = jnp.floor(v).astype(jnp.int32), jnp.floor(u).astype(jnp.int32)
+    return jnp.clip(row, 0, height - 1), jnp.clip(column, 0, width - 1)
+
+
 def world_from_camera_axes() -> jax.Array:
     """The constant WORLD_FROM_CAMERA_AXES (3, 3) as a JAX array, float32."""
     return jnp.asarray(WORLD_FROM_CAMERA_AXES, jnp.float32)

@@ -8,7 +8,7 @@ from flax import struct
 from rein3d_jax.geometry.morphology import window_range, window_sum
 from rein3d_jax.geometry.push_pull import push_pull
 from rein3d_jax.geometry.pyramid import halve
-from rein3d_jax.geometry.sphere import pixel_rays, pixels_from_rays
+from rein3d_jax.geometry.sphere import holding_pixels, pixel_rays, pixels_from_rays
 from rein3d_jax.scene import Panorama
 
 _FAR = 4.0  # times the median known distance: what is unknown and was placed beyond shows through a window
@@ -70,9 +70,8 @@ def _shown(window: jax.Array, glass: jax.Array, positions: jax.Array) -> jax.Arr
     points = pixel_rays(height, width) * glass[..., None]
 
     def marked(shown, position):
-        u, v = pixels_from_rays(points - position, height, width)
-        row, column = (jnp.clip(x.astype(jnp.int32), 0, size - 1) for x, size in ((v, height), (u, width)))
-        return shown.at[row, column].max(window), None
+        places = pixels_from_rays(points - position, height, width)
+        return shown.at[holding_pixels(*places, height, width)].max(window), None
 
     shown, _ = jax.lax.scan(marked, window, positions)
     return (window_sum(shown.astype(jnp.float32), _MARGIN) > 0) & jnp.any(window)

@@ -8,7 +8,7 @@ from rein3d_jax.geometry.morphology import window_range
 from rein3d_jax.geometry.push_pull import push_pull
 from rein3d_jax.geometry.resample import sample_sphere
 from rein3d_jax.geometry.shell import RoomShell, meet_shell
-from rein3d_jax.geometry.sphere import pixel_rays, pixels_from_rays
+from rein3d_jax.geometry.sphere import holding_pixels, pixel_rays, pixels_from_rays
 from rein3d_jax.scene import Panorama, Video
 
 _ON_SHELL = 0.1  # relative distance before the shell within which a pixel shows the room itself
@@ -54,6 +54,6 @@ def _resized(panorama: Panorama, rows: int) -> Panorama:
     if height == rows:
         return panorama
     u, v = pixels_from_rays(pixel_rays(rows, 2 * rows), height, width)
-    row, column = (jnp.clip(x.astype(jnp.int32), 0, size - 1) for x, size in ((v, height), (u, width)))
-    nearest = panorama.distance[row, column], panorama.valid[row, column]
+    held = holding_pixels(u, v, height, width)
+    nearest = panorama.distance[held], panorama.valid[held]
     return Panorama(sample_sphere(panorama.rgb, u, v), *nearest)

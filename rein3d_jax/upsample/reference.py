@@ -10,7 +10,7 @@ from rein3d_jax.geometry.morphology import window_range
 from rein3d_jax.geometry.pyramid import halve, levels
 from rein3d_jax.geometry.resample import sample_sphere_cubic
 from rein3d_jax.geometry.safe import safe_norm
-from rein3d_jax.geometry.sphere import latitudes, pixels_from_rays, rays_of_pose
+from rein3d_jax.geometry.sphere import holding_pixels, latitudes, pixels_from_rays, rays_of_pose
 from rein3d_jax.scene import Panorama
 from rein3d_jax.upsample.distance import SAME_SURFACE
 
@@ -35,7 +35,8 @@ def reference_colours(panorama: Panorama, pose: jax.Array, distance: jax.Array) 
     reach = safe_norm(points)
     ray = points / jnp.maximum(reach, 1e-6)[..., None]
     u, v = pixels_from_rays(ray, *panorama.distance.shape)
-    there = _nearest(_away_from_edges(jnp.where(panorama.valid, panorama.distance, 0.0)), u, v)
+    measured = _away_from_edges(jnp.where(panorama.valid, panorama.distance, 0.0))
+    there = measured[holding_pixels(u, v, *measured.shape)]
     seen = (distance > 0) & (jnp.abs(reach - there) < _RELATIVE * there)
     across, down = _steps(ray, 1), _steps(ray, 0)
     pitch, own = math.pi / len(panorama.rgb), math.pi / height
@@ -50,12 +51,6 @@ def _away_from_edges(distance: jax.Array) -> jax.Array:
     """The distance, 0 where 3 x 3 pixels see more than one surface: colours are mixed there."""
     least, most = window_range(distance)
     return jnp.where(most < SAME_SURFACE * least, distance, 0.0)
-
-
-def _nearest(image: jax.Array, u: jax.Array, v: jax.Array) -> jax.Array:
-    height, width = image.shape
-    row, column = jnp.floor(v).astype(jnp.int32), jnp.floor(u).astype(jnp.int32)
-    return image[jnp.clip(row, 0, height - 1), jnp.clip(column, 0, width - 1)]
 
 
 def _steps(ray: jax.Array, axis: int) -> jax.Array:

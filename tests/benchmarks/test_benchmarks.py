@@ -22,6 +22,7 @@ PARTS = {
     "workloads",
     "studies.__init__",
     "studies.box_room",
+    "studies.room_table",
     "convert.__init__",
     "convert.array_pickle",
     "convert.checkpoint",
