@@ -51,15 +51,15 @@ def scene_of(method: str, count: int, scene: Gaussians, views: Views, extent: fl
     still = replace(config, densification="none", spare=0.0)
     if method == "opacity":
         half = replace(still, steps=config.steps // 2)
-        grown = fit(compact(scene, spare=0.0), views, extent, half, stages)
+        grown = fit(compact(scene), views, extent, half, stages)
         pruned = prune_to(grown, jax.nn.sigmoid(grown.opacity_logits), count)
-        return fit(compact(pruned, spare=0.0), views, extent, half, stages)
+        return fit(compact(pruned), views, extent, half, stages)
     cameras = [camera_of(views, int(i)) for i in np.linspace(0, len(views.rgb) - 1, 48)]
     weight = contribution(scene, cameras, config=stages.rasterize)
     if method == "contribution":
-        return fit(compact(prune_to(scene, weight, count), spare=0.0), views, extent, still, stages)
+        return fit(compact(prune_to(scene, weight, count)), views, extent, still, stages)
     start = int(START * count)
-    buffer = compact(prune_to(scene, weight, start), spare=count / start - 1)
+    buffer = compact(prune_to(scene, weight, start), capacity=count)
     return fit(buffer, views, extent, replace(config, densification=method), stages)
 
 
@@ -74,7 +74,7 @@ def measure(source: RoomSource, config: ReconstructConfig) -> dict[str, dict]:
         for method in METHODS:
             count = int(budget * living)
             scene = scene_of(method, count, states[-1].scene, views, scene_extent(panorama), config)
-            pictures = render_views(scene, truth, room.backdrop, config=config.rasterize)
+            (pictures,) = render_views([scene], truth, room.backdrop, config=config.rasterize)
             found = float(np.mean([psnr(p, view.rgb) for p, view in zip(pictures, truth, strict=True)]))
             row = {"psnr": found, "count": int(jnp.sum(scene.alive)), "seconds": 0.0, "paths": len(states)}
             rows[f"{method}, {budget:.0%}"] = row

@@ -30,7 +30,7 @@ from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.networks.trained import read_network
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
 from rein3d_jax.pipeline.peel_scene import peel_scene
-from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene
+from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene, where_it_pays
 from rein3d_jax.pipeline.survey import Survey, lift_scene, room_background
 from rein3d_jax.restore import restorer
 from rein3d_jax.scene import Gaussians
@@ -38,6 +38,8 @@ from rein3d_jax.scene import Gaussians
 RECIPE = "quick"
 SIZE = ("input.height=128", "restore.height=128", "lift.share=1.0", "refine.views.size=64", "refine.steps=200",
         "refine.evaluate_every=200")  # fmt: skip
+NO_LAYERS = ("peel.room=false", "peel.outside=false")
+EVERY_PATH = ("explore.min_revealed=0",)
 GROWING = ("refine.densification=default", "refine.densify.start=25", "refine.densify.every=25",
            "refine.densify.stop=151", "refine.spare=0.2")  # fmt: skip
 AUTOMATIC = ("explore.min_revealed=0.005", "lift.share=0.5", "refine.steps=400", "refine.evaluate_every=100",
@@ -46,18 +48,21 @@ AUTOMATIC = ("explore.min_revealed=0.005", "lift.share=0.5", "refine.steps=400",
 
 def tables() -> dict[str, dict[str, tuple[str, ...]]]:
     """Rows by table: name -> the recipe's keys that it changes. The first row is the one that others are held to."""
-    local = ("explore.max_length=0.5", "explore.step=0.25")
     weights = {f"guesses weigh {w}": (f"refine.loss.restored={w}",) for w in (1.0, 0.5, 0.25)}
     grid = itertools.product((0.25, 0.5, 1.0), (2, 4, 8), (0, 400))
     return {
         "exploration": {
-            "radial, 8 paths": (),
-            "4 paths": ("explore.trajectories=4",),
-            "2 paths": ("explore.trajectories=2",),
-            "local, 8 paths of 0.5 m": local,
-            "each path alone": ("restore.sequential=false",),
-            "restored at 256 rows": ("restore.height=256",),
-            "no path restored": ("restore.method=none",),
+            "layers behind, a path where 1 % is open": (),
+            "the same, without what is outside": ("peel.outside=false",),
+            "layers behind, every path": EVERY_PATH,
+            "every path, no layers": (*EVERY_PATH, *NO_LAYERS),
+            "4 paths": (*EVERY_PATH, *NO_LAYERS, "explore.trajectories=4"),
+            "2 paths": (*EVERY_PATH, *NO_LAYERS, "explore.trajectories=2"),
+            "local, 8 paths of 0.5 m": (*EVERY_PATH, *NO_LAYERS, "explore.max_length=0.5", "explore.step=0.25"),
+            "each path alone": (*EVERY_PATH, *NO_LAYERS, "restore.sequential=false"),
+            "each path alone, behind layers": (*EVERY_PATH, "restore.sequential=false"),
+            "not refined": (*EVERY_PATH, *NO_LAYERS, "refine.steps=0"),
+            "neither path nor layer": (*EVERY_PATH, *NO_LAYERS, "restore.method=none"),
         },
         "weights": weights
         | {
@@ -128,7 +133,9 @@ class Bench:
         states, seconds = self.fused(config)
         panorama = self.made[config.input.height][0]
         started = perf_counter()
-        views = collect_views(panorama, [state.video for state in states], stages=config)
+        videos = [state.video for state in states]
+        config = where_it_pays(config, videos)
+        views = collect_views(panorama, videos, stages=config)
         key = jax.random.key(config.seed + 1)
         (last,) = deque(refine_scene(states[-1].scene, views, panorama, key, stages=config), maxlen=1)
         return jax.block_until_ready(last.scene), seconds + perf_counter() - started
@@ -138,7 +145,7 @@ class Bench:
         scene, seconds = self.refined(config)
         room = EvaluationRoom(self.source, config)
         views = [view for view in room.traced.views if is_novel(view)]
-        pictures = render_views(scene, views, room.backdrop, config=config.rasterize)
+        (pictures,) = render_views([scene], views, room.backdrop, config=config.rasterize)
         found = float(np.mean([psnr(picture, view.rgb) for picture, view in zip(pictures, views, strict=True)]))
         restored = sum(state.video.rgb.shape[0] > 1 for state in self.fused(config)[0])
         digest = hashlib.sha256(b"".join(np.asarray(leaf).tobytes() for leaf in jax.tree.leaves(scene))).hexdigest()

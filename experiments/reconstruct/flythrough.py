@@ -1,4 +1,4 @@
-"""The film: out and back along every trajectory, yawing at the panorama's centre."""
+"""The film: out and back along every trajectory, once round, yawing at the panorama's centre."""
 
 import dataclasses
 from collections.abc import Iterator
@@ -37,7 +37,9 @@ def flythrough(
     gaussians: Gaussians, trajectories: Trajectories, backdrop, *, film: FilmConfig, config: RasterizeConfig
 ) -> Iterator:
     """Yields (height, width, 3) pictures. The way back shows the way out again, backwards: it is rendered once."""
-    azimuths, lengths = np.asarray(trajectories.directions), np.asarray(trajectories.lengths)
+    # Trajectories come longest first; one beside the other, there is one turn to show between them, not five.
+    round_way = np.argsort(np.asarray(trajectories.directions) % (2 * np.pi), kind="stable")
+    azimuths, lengths = (np.asarray(x)[round_way] for x in (trajectories.directions, trajectories.lengths))
     ends = [_camera(np.zeros(3), -azimuth, film) for azimuth in azimuths]
     buffers = allocate(gaussians, ends, config=config, slack=1.5)
 

@@ -3,6 +3,7 @@ would miss them."""
 
 import json
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import jax
@@ -23,7 +24,9 @@ from rein3d_jax.explore.trajectories import Trajectories, path_ends
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.pictures.video import write_mp4
 from rein3d_jax.io.splats.ply import write_ply
+from rein3d_jax.lift import compact
 from rein3d_jax.pipeline.stages import render_video
+from rein3d_jax.rasterize import bucket
 from rein3d_jax.report.report import render_report
 from rein3d_jax.scene import Gaussians
 
@@ -32,12 +35,14 @@ def write_outputs(run: Run, store: StageStore, clock: Clock) -> dict:
     """Every file of the run's folder; returns what metrics.json holds."""
     begun, config, result, output = time.perf_counter(), run.config, run.result, Path(run.config.output)
     write_ply(output / "scene.ply", result.scene, antialias=config.rasterize.antialias)
-    film = flythrough(result.scene, result.trajectories, run.backdrop, film=config.film, config=config.rasterize)
-    write_mp4(output / "flythrough.mp4", film, config.film.rate)
-    scenes = (result.coarse, result.scene)
-    truths = [render_views(scene, run.views, run.backdrop, config=config.rasterize) for scene in scenes]
-    ends = _ends(result.trajectories)
-    (coarse_ends, seen), (refined_ends, covered) = (_panoramas(scene, ends, config) for scene in scenes)
+    scenes = _alike(result.coarse, result.scene)
+    with ThreadPoolExecutor(1) as beside:  # a processor has two cores, and a picture takes one
+        film = beside.submit(_write_film, scenes[-1], run)
+        write_text(output / "viewer.html", viewer_page(run))
+        truths = render_views(scenes, run.views, run.backdrop, config=config.rasterize)
+        ends = _ends(result.trajectories)
+        (coarse_ends, seen), (refined_ends, covered) = (_panoramas(scene, ends, run) for scene in scenes)
+        film.result()
     metrics = {
         **run_metrics.cost(store, len(result.panorama.rgb)),
         **run_metrics.size(result, output / "scene.ply"),
@@ -52,7 +57,6 @@ def write_outputs(run: Run, store: StageStore, clock: Clock) -> dict:
         metrics["quality"] = {n: quality(p, run.views) for n, p in zip(("coarse", "refined"), truths, strict=True)}
     metrics["seconds"]["write"] = round(time.perf_counter() - begun, 3)
     metrics["seconds"]["total"] = round(clock.elapsed(), 3)
-    write_text(output / "viewer.html", viewer_page(run))
     pictures = Pictures(coarse_ends, refined_ends, *truths)
     write_text(output / "report.html", render_report(run_report(run, pictures, metrics)))
     write_text(output / "metrics.json", json.dumps(metrics, indent=2) + "\n")
@@ -64,7 +68,20 @@ def _ends(trajectories: Trajectories) -> jax.Array:
     return path_ends(trajectories)[jnp.array(longest(trajectories))]
 
 
-def _panoramas(scene: Gaussians, poses: jax.Array, config) -> tuple[list, float]:
+def _alike(*scenes: Gaussians) -> list[Gaussians]:
+    """The scenes in buffers of one size, which then share compiled programs."""
+    capacity = bucket(max(int(scene.alive.sum()) for scene in scenes))
+    return [compact(scene, capacity=capacity) for scene in scenes]
+
+
+def _write_film(scene: Gaussians, run: Run) -> None:
+    config = run.config
+    film = flythrough(scene, run.result.trajectories, run.backdrop, film=config.film, config=config.rasterize)
+    write_mp4(Path(config.output) / "flythrough.mp4", film, config.film.rate)
+
+
+def _panoramas(scene: Gaussians, poses: jax.Array, run: Run) -> tuple[list, float]:
     """What the scene shows there, holes black; and the share of the sphere that it covers, the poses' mean."""
-    video, _ = render_video(scene, poses, config.restore.height, config=config.rasterize)
+    config, buffers = run.config, run.result.buffers
+    video, _ = render_video(scene, poses, config.restore.height, config=config.rasterize, buffers=buffers)
     return list(np.asarray(video.rgb * video.alpha[..., None])), float(jnp.mean(coverage(video.alpha)))

@@ -1,5 +1,7 @@
 """A scene against ground-truth views: the numbers of metrics.json."""
 
+from collections.abc import Sequence
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -17,14 +19,16 @@ def is_novel(view: View) -> bool:
     return float(jnp.linalg.norm(view.camera.world_from_camera[:3, 3])) > AT_ORIGIN
 
 
-def render_views(gaussians: Gaussians, views: list[View], backdrop: jax.Array, *, config: RasterizeConfig):
-    """[(h, w, 3)] pictures of the scene over the colour `backdrop` (3,)."""
-    pictures = []
-    buffers = allocate(gaussians, [view.camera for view in views], config=config) if views else None
-    for view in views:
-        frame, buffers = render(gaussians, view.camera, config=config, buffers=buffers)
-        pictures.append(np.asarray(jnp.clip(frame.rgb + (1 - frame.alpha[..., None]) * backdrop, 0, 1)))
-    return pictures
+def render_views(scenes: Sequence[Gaussians], views: list[View], backdrop: jax.Array, *, config: RasterizeConfig):
+    """Of each scene the (h, w, 3) pictures over the colour `backdrop` (3,), in the buffers that the last one needs."""
+    buffers = allocate(scenes[-1], [view.camera for view in views], config=config) if views else None
+    found = []
+    for scene in scenes:
+        found.append([])
+        for view in views:
+            frame, buffers = render(scene, view.camera, config=config, buffers=buffers)
+            found[-1].append(np.asarray(jnp.clip(frame.rgb + (1 - frame.alpha[..., None]) * backdrop, 0, 1)))
+    return found
 
 
 def quality(pictures: list[np.ndarray], views: list[View]) -> dict:

@@ -2,23 +2,24 @@
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.scene import Gaussians
 
 
 def with_capacity(gaussians: Gaussians, capacity: int) -> Gaussians:
-    """The same scene in a buffer of `capacity` slots (0: twice its own), the new ones dead and finite.
+    """The same scene in a buffer of `capacity` slots, the new ones dead and finite. Outside jit.
 
     Raises InputError where the scene does not fit: nothing is dropped to make it.
     """
     count = gaussians.alive.shape[0]
-    capacity = capacity or 2 * count
     if capacity < count:
         raise InputError(f"lift.capacity {capacity:_} < {count:_} pixels; raise it or lower lift.share")
     grow = capacity - count
-    padded = jax.tree.map(lambda x: jnp.pad(x, [(0, grow)] + [(0, 0)] * (x.ndim - 1)), gaussians)
-    return padded.replace(quats=padded.quats.at[capacity - grow :, 0].set(1.0))
+    padded = jax.tree.map(lambda x: np.pad(x, [(0, grow)] + [(0, 0)] * (x.ndim - 1)), gaussians)
+    padded.quats[count:, 0] = 1.0
+    return jax.tree.map(jnp.asarray, padded)
 
 
 def _merge(scene: Gaussians, new: Gaussians) -> tuple[Gaussians, jax.Array]:
@@ -35,7 +36,10 @@ def _merge(scene: Gaussians, new: Gaussians) -> tuple[Gaussians, jax.Array]:
 merge = jax.jit(_merge)
 
 
-def compact(scene: Gaussians, *, spare: float = 0.0) -> Gaussians:
-    """The living ones in their order, in a buffer of that size plus a share of `spare` dead slots. Outside jit."""
-    living = jax.tree.map(lambda x: x[scene.alive], scene)
-    return with_capacity(living, int(living.alive.shape[0] * (1 + spare)))
+def compact(scene: Gaussians, *, capacity: int | None = None) -> Gaussians:
+    """The living ones in their order, in a buffer of `capacity` slots or, without one, of their number. Outside jit.
+    Raises InputError where they do not fit."""
+    alive = np.asarray(scene.alive)  # NumPy: every count would compile programs of its own
+    count = int(alive.sum())
+    living = jax.tree.map(lambda x: np.asarray(x)[alive], scene)
+    return with_capacity(living, count if capacity is None else capacity)

@@ -9,7 +9,7 @@ from rein3d_jax.settings import Settings, setting
 class LiftConfig(Settings):
     """The lift's settings."""
 
-    capacity: int = setting(0, "slots for Gaussians; 0: twice the lifted ones, room to explore", within="[0, inf)")
+    capacity: int = setting(0, "slots for Gaussians; 0: as many as it takes", within="[0, inf)")
     opacity: float = setting(0.99, "opacity of every Gaussian", within="(0, 1)")
     footprint: float = setting(0.75, "sigma over half a pixel's diagonal where there is detail", within="(0, inf)")
     plain_footprint: float = setting(1.15, "the same where the picture is plain", within="(0, inf)")

@@ -23,8 +23,8 @@ class Explored:
     """The scene after some trajectories: enough to go on with the next one, to the bit."""
 
     scene: Gaussians
-    video: Video  # the last trajectory's frames, holes filled; alpha still says what was observed. The first frame
-    # alone where the path revealed too little to be restored
+    video: Video  # the last trajectory's frames, holes filled; alpha still says what was observed. The last frame alone
+    # where the path revealed too little to be restored
     taken: jax.Array  # () trajectories so far
     revealed: jax.Array  # () share of the sphere that was open at the last path's end
     overflow: jax.Array  # () Gaussians that found no slot in the scene's buffer, so far
@@ -54,8 +54,7 @@ def _explored(known: Survey, restore: Restorer, key: jax.Array, stages: Stages, 
     end, buffers = render_video(seen, poses[-1:], height, config=raster, buffers=before.buffers)
     revealed = 1 - jnp.mean(coverage(end.alpha))
     if revealed < stages.explore.min_revealed:
-        video, buffers = render_video(seen, poses[:1], height, config=raster, buffers=buffers)
-        after = before.replace(buffers=buffers)
+        video, after = end, before.replace(buffers=buffers)
     else:
         degraded, buffers = render_video(seen, poses, height, config=raster, buffers=buffers)
         video, after = restore(degraded, key), before.replace(buffers=buffers)

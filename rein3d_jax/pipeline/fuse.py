@@ -8,7 +8,8 @@ from flax import struct
 from rein3d_jax.explore.hidden import hidden_distance
 from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.geometry.sphere import rays_of_pose
-from rein3d_jax.lift import lift, merge
+from rein3d_jax.lift import lift
+from rein3d_jax.pipeline.buffer import joined_in
 from rein3d_jax.pipeline.stages import Stages
 from rein3d_jax.rasterize import Buffers, render
 from rein3d_jax.scene import Gaussians, Panorama, Video
@@ -44,8 +45,9 @@ def fuse_guesses(start: Fused, degraded: Video, restored: Video, panorama: Panor
         hole = (alpha < stages.restore.observed) & guess.valid
         moved = jnp.abs(guess.distance - restored.distance[index]) > _MOVED * guess.distance
         for part, config_of_part in ((hole & ~moved, config), (hole & moved, round_ones)):
-            scene, dropped = merge(scene, lift(guess, camera.world_from_camera, part, config=config_of_part))
-            overflow += int(dropped)
+            new = lift(guess, camera.world_from_camera, part, config=config_of_part)
+            scene, dropped = joined_in(scene, new, grow=not stages.lift.capacity)
+            overflow += dropped
     return Fused(scene, overflow, buffers)
 
 

@@ -12,6 +12,7 @@ from rein3d_jax.pipeline.peel_scene import peel_scene
 from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene, where_it_pays
 from rein3d_jax.pipeline.stages import Stages
 from rein3d_jax.pipeline.survey import Survey, room_background, survey, with_distance
+from rein3d_jax.rasterize import Buffers
 from rein3d_jax.refine import Curves
 from rein3d_jax.restore import TrainedNetwork, restorer
 from rein3d_jax.scene import Gaussians, Panorama, Video
@@ -41,6 +42,7 @@ class Reconstruction:
     scene: Gaussians
     curves: Curves
     decisions: Decisions
+    buffers: Buffers = struct.field(pytree_node=False)  # the rasterizer's for panoramas of the scene
 
 
 def reconstruct(
@@ -83,5 +85,5 @@ def joined(
     scene, curves, stopped = refined
     revealed = tuple(round(float(state.revealed), 4) for state in explored)
     decisions = Decisions(revealed, why, stopped, int(explored[-1].overflow))
-    videos = tuple(state.video for state in explored)
-    return Reconstruction(known.panorama, known.coarse, known.trajectories, videos, scene, curves, decisions)
+    videos, buffers = tuple(state.video for state in explored), Buffers(*map(int, explored[-1].buffers))
+    return Reconstruction(known.panorama, known.coarse, known.trajectories, videos, scene, curves, decisions, buffers)

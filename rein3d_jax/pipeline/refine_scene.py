@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from rein3d_jax.explore.hidden import in_doubt, on_observed
-from rein3d_jax.lift import compact, with_capacity
+from rein3d_jax.lift import compact
 from rein3d_jax.parallel import data_mesh
 from rein3d_jax.pipeline.devices import steps_over
 from rein3d_jax.pipeline.stages import Stages, origin_pose
@@ -73,8 +73,7 @@ def _within_limits(scene: Gaussians, views: Views, stages: Stages) -> Gaussians:
         chosen = np.unique(np.linspace(0, len(views.rgb) - 1, _WEIGHED).astype(int))
         cameras = [camera_of(views, int(i)) for i in chosen]
         scene = prune_to(scene, contribution(scene, cameras, config=stages.rasterize), limit)
-    scene = compact(scene, spare=stages.refine.spare)
-    scene = with_capacity(scene, bucket(scene.alive.shape[0]))
+    scene = compact(scene, capacity=bucket(int(int(scene.alive.sum()) * (1 + stages.refine.spare))))
     if 0 < limit < scene.alive.shape[0]:
         scene = jax.tree.map(lambda x: x[:limit], scene)  # the living come first
     return scene

@@ -10,7 +10,8 @@ from rein3d_jax.depth.room_shell import fit_room_shell, shell_distance
 from rein3d_jax.depth.shell_from_distance import shell_from_distance
 from rein3d_jax.errors import InputError
 from rein3d_jax.explore.trajectories import Trajectories, radial_trajectories
-from rein3d_jax.lift import LiftConfig, lift_adaptively, with_capacity
+from rein3d_jax.lift import LiftConfig, lift_adaptively
+from rein3d_jax.pipeline.buffer import allotted
 from rein3d_jax.pipeline.stages import Stages, origin_pose
 from rein3d_jax.restore import Background, RestoreConfig, background_of
 from rein3d_jax.scene import Gaussians, Panorama
@@ -54,11 +55,11 @@ def survey(panorama: Panorama, stages: Stages) -> Survey:
 
 
 def lift_scene(panorama: Panorama, config: LiftConfig) -> Gaussians:
-    """The coarse scene, in a buffer with room for what exploring will add."""
+    """The coarse scene."""
     everywhere = jnp.ones(panorama.distance.shape, bool)
     placed = panorama.replace(valid=everywhere)  # an unknown distance was completed; its colour is known
     scene = lift_adaptively(placed, origin_pose(), everywhere, config=config)
-    return with_capacity(scene, config.capacity or scene.alive.size + everywhere.size)
+    return allotted(scene, config)
 
 
 def room_background(panorama: Panorama, config: RestoreConfig) -> Background | None:

@@ -15,6 +15,8 @@ from rein3d_jax.rasterize.project import Splats
 from rein3d_jax.rasterize.strips import tile_columns, tile_rows
 from rein3d_jax.scene import Camera
 
+_MEASURED = 16_384  # (splat, row of tiles) pairs that are measured at a time
+
 
 @struct.dataclass
 class Chunks:
@@ -55,13 +57,17 @@ def _expand(counts: jax.Array, capacity: int) -> tuple[jax.Array, jax.Array, jax
 def needed_pairs(splats: Splats, camera: Camera, *, config: RasterizeConfig) -> jax.Array:
     """The numbers (2,) of (splat, row of tiles) and (splat, tile) pairs: what `allocate` measures, without a buffer."""
     first, count = tile_rows(splats, camera, config=config)
-    ids = jnp.arange(first.shape[0])
+    ends, rows = jnp.cumsum(count), jnp.sum(count)
 
-    def add_row(nth, total):
-        _, columns = tile_columns(splats, ids, first + nth, camera, config=config)
-        return total + jnp.sum(jnp.where(nth < count, columns, 0))
+    def add_block(number, total):
+        """Rows of tiles by the thousand: most splats have one or two of them, and a few have all."""
+        nth = number * _MEASURED + jnp.arange(_MEASURED)
+        owner = jnp.minimum(jnp.searchsorted(ends, nth, side="right"), count.size - 1)
+        row = first[owner] + nth - (ends - count)[owner]
+        _, columns = tile_columns(splats, owner, row, camera, config=config)
+        return total + jnp.sum(jnp.where(nth < rows, columns, 0))
 
-    return jnp.stack([jnp.sum(count), jax.lax.fori_loop(0, jnp.max(count, initial=0), add_row, jnp.int32(0))])
+    return jnp.stack([rows, jax.lax.fori_loop(0, -(-rows // _MEASURED), add_block, jnp.int32(0))])
 
 
 def _pairs(splats: Splats, camera: Camera, config: RasterizeConfig, buffers: Buffers):

@@ -47,7 +47,7 @@ def test_merging_nothing_changes_nothing() -> None:
 def test_compacting_keeps_the_living_in_order() -> None:
     old = scene(6, [True, False, True, False, False, True])
     assert places(compact(old)) == places(old) and compact(old).alive.shape == (3,)
-    roomy = compact(old, spare=1.0)
+    roomy = compact(old, capacity=6)
     assert places(roomy) == places(old) and roomy.alive.shape == (6,)
 
 
@@ -56,7 +56,6 @@ def test_new_slots_are_dead_and_finite() -> None:
     assert grown.alive.tolist() == [True] * 3 + [False] * 2
     assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(grown))
     np.testing.assert_array_equal(jnp.linalg.norm(grown.quats, axis=-1), 1.0)
-    assert with_capacity(scene(3, [True] * 3), 0).alive.shape == (6,)  # 0: twice its own
 
 
 def test_a_smaller_buffer_is_refused_with_the_mend() -> None:

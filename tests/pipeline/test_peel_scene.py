@@ -41,7 +41,7 @@ def peeled(known, **changes):
 
 def test_what_is_new_lies_behind_what_was_seen(known):
     scene = peeled(known)
-    new = scene.alive & ~known.coarse.alive
+    new = scene.alive & ~r3d.lift.with_capacity(known.coarse, scene.alive.size).alive
     assert int(new.sum()) > 50
     assert not on_observed(known.panorama, scene.means)[new].any()
 

@@ -21,6 +21,7 @@ from rein3d_jax.depth.level import unasked_lean
 from rein3d_jax.geometry.poses import pinhole_camera, upright
 from rein3d_jax.io.rooms.traced_room import View
 from rein3d_jax.pipeline.reconstruct import ALL_PATHS, Decisions, Reconstruction
+from rein3d_jax.rasterize import Buffers
 from rein3d_jax.refine import Curves
 from rein3d_jax.refine.refine import ALL_STEPS
 from rein3d_jax.report.report import Comparison, render_report
@@ -48,7 +49,7 @@ def run(run_folder):
     curves = Curves(*[np.zeros((0, 2))] * 3, *[np.zeros(())] * 3)
     decisions = Decisions((0.1, 0.1), ALL_PATHS, ALL_STEPS, 0)
     scenes = (found.coarse, found.trajectories, tuple(found.videos()), found.refined)
-    result = Reconstruction(found.panorama, *scenes, curves, decisions)
+    result = Reconstruction(found.panorama, *scenes, curves, decisions, Buffers(64, 64, 64, 64))
     view = View(HOSTILE, PICTURE, pinhole_camera(upright(np.array([0.5, 0, 0])), 32, 1.5))
     return Run(dataclasses.replace(found.config, input=named), result, False, "", [view], unasked_lean())
 
