@@ -3,7 +3,8 @@
 import dataclasses
 import importlib.metadata
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import jax
@@ -15,12 +16,14 @@ from experiments.reconstruct.budget import OUT_OF_TIME, Clock, check_memory, wit
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.inputs import input_fingerprint, input_views, levelled_views, told_panorama, working_rows
 from experiments.reconstruct.outputs import write_outputs
+from experiments.reconstruct.pages.first_look import write_first_look
 from experiments.reconstruct.progress import Progress
 from experiments.reconstruct.run import Run
 from experiments.reconstruct.stage_store import StageStore
 from rein3d_jax.depth.level import Lean
 from rein3d_jax.explore.trajectories import radial_trajectories
 from rein3d_jax.io.files.atomic import write_text
+from rein3d_jax.lift import LiftConfig
 from rein3d_jax.networks.depth import SHIPPED_DEPTH, read_depth_network
 from rein3d_jax.networks.trained import files_digest, read_network, weights_fingerprint
 from rein3d_jax.networks.upsampler import read_upsampler, upsampler_fingerprint
@@ -28,10 +31,10 @@ from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restor
 from rein3d_jax.pipeline.peel_scene import peel_scene
 from rein3d_jax.pipeline.reconstruct import ALL_PATHS, Reconstruction, joined
 from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene, where_it_pays
-from rein3d_jax.pipeline.survey import Survey, lift_scene, room_background, with_distance
+from rein3d_jax.pipeline.survey import Survey, lift_scene, room_background, survey, with_distance
 from rein3d_jax.refine import Snapshot, evaluate_held_out
 from rein3d_jax.restore import restorer
-from rein3d_jax.upsample import then_upsample
+from rein3d_jax.upsample import NONE, then_upsample
 
 PACKAGES = ("rein3d-jax", "jax", "jaxlib", "flax", "optax", "numpy", "opencv-contrib-python-headless", "OpenImageIO")
 
@@ -50,6 +53,13 @@ class _Job:
         result = self.store.run(name, depends, make)
         self.progress.done(self.store.finished[-1])
         return result
+
+    def look(self, known: Survey, about: Sequence) -> None:
+        """Writes the pages of what is known, for the first look; `about` is whether the distance was estimated, what
+        was done to a given one, and how the picture leaned."""
+        estimated, told, lean = about
+        write_first_look(Run(self.config, known, bool(estimated), told, [], lean))
+        self.progress.look(Path(self.config.output))
 
     def settings(self, stage: str) -> dict:
         """Those of a stage, as its key takes them."""
@@ -94,21 +104,37 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str, Lean]:
         weights,
         jax.__version__,
     ]
-    panorama, estimated, told, lean = job.stage("read", depends, lambda: _read(config))
+    panorama, *about = job.stage("read", depends, lambda: _read(job))
+    estimated, told, lean = bool(about[0]), *about[1:]
     coarse = job.stage("lift", job.settings("lift"), lambda: lift_scene(panorama, config.lift))
     trajectories = job.stage(
         "explore", job.settings("explore"), lambda: radial_trajectories(panorama, config=config.explore)
     )
     known = Survey(panorama, coarse, trajectories)
+    job.look(known, (estimated, told, lean))
     explored = list(_explored(job, known, key))
     scene, curves, stopped = job.stage(
         "refine", job.settings("refine"), lambda: _refined(job, known, explored, jax.random.fold_in(key, 1))
     )
     why = ALL_PATHS if len(explored) == config.explore.trajectories else OUT_OF_TIME
-    return joined(known, explored, (scene, curves, stopped), why), bool(estimated[0]), told, lean
+    return joined(known, explored, (scene, curves, stopped), why), estimated, told, lean
 
 
-def _read(config: ReconstructConfig):
+def _read(job: _Job):
+    """The panorama, whether its distance was estimated, what was done to a given one, how it leaned. While the network
+    makes it finer, what it is shows itself."""
+    config = job.config
+    as_it_is = dataclasses.replace(config, input=dataclasses.replace(config.input, upsample=NONE))
+    if working_rows(as_it_is.input) == working_rows(config.input):
+        return _told(config)
+    with ThreadPoolExecutor(1) as beside:
+        finer = beside.submit(_told, config)
+        panorama, *about = _told(as_it_is)
+        job.look(survey(panorama, dataclasses.replace(config, lift=LiftConfig())), about)
+        return finer.result()
+
+
+def _told(config: ReconstructConfig):
     network = read_depth_network() if config.asks_network else None
     panorama, told, lean = told_panorama(config.input, read_upsampler(config.input.upsample))
     panorama, estimated = with_distance(panorama, config, network, camera_height=config.input.eye_height)

@@ -16,9 +16,9 @@ from experiments.reconstruct.budget import Clock
 from experiments.reconstruct.flythrough import flythrough
 from experiments.reconstruct.quality import quality, render_views
 from experiments.reconstruct.run import Pictures, Run
-from experiments.reconstruct.run_report import longest, run_report
+from experiments.reconstruct.pages.run_report import longest, run_report
 from experiments.reconstruct.stage_store import StageStore
-from experiments.reconstruct.viewer_page import viewer_page
+from experiments.reconstruct.pages.viewer_page import viewer_page
 from rein3d_jax.evaluate.coverage import coverage
 from rein3d_jax.explore.trajectories import Trajectories, path_ends
 from rein3d_jax.io.files.atomic import write_text

@@ -20,7 +20,7 @@ class Progress:
         self.bars = Bars(*columns, console=self.console, transient=True)
         paths = config.explore.trajectories
         total = sum(_STAGE_COST.values()) + (paths - 1) * _STAGE_COST["restore"] + config.refine.steps
-        self.task, self.before_steps = self.bars.add_task("reading", total=total), 0
+        self.task, self.before_steps, self.looked = self.bars.add_task("reading", total=total), 0, False
 
     def __enter__(self):
         self.bars.start()
@@ -34,6 +34,12 @@ class Progress:
         self.console.print(f"{stage.name:<12} {'found finished' if stage.found else f'{stage.seconds:.1f} s'}")
         self.before_steps += _STAGE_COST.get(stage.name.split("-")[0], 0)
         self.bars.update(self.task, completed=self.before_steps, description=f"after {stage.name}")
+
+    def look(self, output: Path) -> None:
+        """There is something to see; told once."""
+        if not self.looked:
+            self.console.print(f"open {output / 'viewer.html'} for a first look, while the job goes on")
+        self.looked = True
 
     def step(self, number: int) -> None:
         """`number` refinement steps are done."""

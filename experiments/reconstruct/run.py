@@ -1,4 +1,4 @@
-"""A finished job, and the pictures of it that its report shows."""
+"""A job and what it has made, and the pictures of it that its report shows."""
 
 import dataclasses
 
@@ -12,18 +12,24 @@ from rein3d_jax.evaluate.coverage import coverage
 from rein3d_jax.explore.hidden import DOUBTFUL
 from rein3d_jax.io.rooms.traced_room import View
 from rein3d_jax.pipeline.reconstruct import Reconstruction
+from rein3d_jax.pipeline.survey import Survey
 
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """What a job made, and what it was asked for."""
+    """What a job has made, and what it was asked for."""
 
     config: ReconstructConfig
-    result: Reconstruction
+    result: Reconstruction | Survey  # a survey, while the job goes on
     estimated: bool  # whether the distance was, by stages.depth.method
     converted: str  # what was done to a given distance, in words; "" = nothing
     views: list[View]  # ground truth, in the levelled panorama's world
     lean: Lean  # of the picture as it came
+
+    @property
+    def finished(self) -> bool:
+        """Whether there is more than a survey."""
+        return isinstance(self.result, Reconstruction)
 
     @property
     def distance_origin(self) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.reconstruct.run_report import room_plan
+from experiments.reconstruct.pages.run_report import room_plan
 from experiments.run_folder import RunFolder, open_run
 from experiments.view.server import Pages
 from rein3d_jax.errors import InputError

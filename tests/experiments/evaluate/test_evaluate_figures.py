@@ -122,10 +122,10 @@ def test_a_chart_compares_the_same_rooms(tmp_path, capsys):
 
 def test_what_the_report_compares_with_is_the_committed_results():
     """After new ones, in benchmarks/results: python -m experiments.evaluate
-    --chart evaluate.json evaluate_draft.json evaluate_quick.json --points ../../experiments/reconstruct/measured.json
+    --chart evaluate.json evaluate_draft.json evaluate_quick.json --points ../../experiments/reconstruct/pages/measured.json
     """
     results = ROOT / "benchmarks" / "results"
     rooms, panels = chart_points([results / f"evaluate{name}.json" for name in ("", "_draft", "_quick")])
-    packaged = json.loads((ROOT / "experiments/reconstruct/measured.json").read_text())
+    packaged = json.loads((ROOT / "experiments/reconstruct/pages/measured.json").read_text())
     table = [asdict(panel) | {"points": [asdict(point) for point in points]} for panel, points in panels]
     assert packaged == {"rooms": rooms, "panels": table}

@@ -8,7 +8,7 @@ import numpy as np
 
 from experiments.reconstruct.quality import is_novel
 from experiments.reconstruct.run import Pictures, Run
-from experiments.reconstruct.sources import sources
+from experiments.reconstruct.pages.sources import sources
 from rein3d_jax.explore.hidden import DOUBTFUL
 from rein3d_jax.explore.profile import ExploreConfig, travel
 from rein3d_jax.explore.trajectories import Trajectories
@@ -50,6 +50,21 @@ def run_report(run: Run, pictures: Pictures, metrics: dict) -> Report:
     )
 
 
+def first_report(run: Run) -> Report:
+    """The report of a run that has surveyed the panorama, and goes on."""
+    return Report(
+        title="Your room in 3D: a first look",
+        summary="What the panorama saw, lifted to 3D: open viewer.html. What things hide is still black; the job goes on, "
+        "and puts what it finds in the place of both pages.",
+        facts=(("Gaussians", f"{int(run.result.coarse.alive.sum()):,}"),),
+        distance_origin=_distance_origin(run),
+        warnings=tuple(_warnings_of_input(run)),
+        parts=(_went_in(run),),
+        floor_map=room_plan(run.result.trajectories, run.config.explore, run.views),
+        sources=sources(run.config.input.panorama),
+    )
+
+
 def _distance_origin(run: Run) -> str:
     if not run.estimated:
         return "given with the panorama" + (f": {run.converted}." if run.converted else ".")
@@ -63,8 +78,7 @@ def _distance_origin(run: Run) -> str:
     return f"{said}, and sizes follow the camera's height above the floor, {run.config.input.eye_height} m ({told})."
 
 
-def _warnings(run: Run, metrics: dict):
-    trajectories, paths = run.result.trajectories, len(run.result.videos)
+def _warnings_of_input(run: Run):
     if run.estimated and run.config.depth.method == "shell":
         yield "The distance is that of an empty room: furniture will look flat from the side. Give --distance."
     if (run.estimated or run.config.input.scaled) and run.config.input.camera_height is None:
@@ -80,8 +94,13 @@ def _warnings(run: Run, metrics: dict):
     unknown = 1 - float(jnp.mean(run.result.panorama.valid))
     if unknown > 0.001:
         yield f"{unknown:.1%} of the panorama has no known distance (windows, mirrors); it was placed far away."
-    if float(jnp.max(trajectories.lengths)) < run.config.explore.step:
+    if float(jnp.max(run.result.trajectories.lengths)) < run.config.explore.step:
         yield "There was no room to move the camera: nothing hidden was revealed. Lower explore.camera_radius."
+
+
+def _warnings(run: Run, metrics: dict):
+    trajectories, paths = run.result.trajectories, len(run.result.videos)
+    yield from _warnings_of_input(run)
     yield from _coverage_warnings(metrics["coverage"])
     for name, number in metrics["overflows"].items():
         if number:
@@ -107,7 +126,7 @@ def _coverage_warnings(coverage: dict):
         yield f"{empty:.0%} of what one sees from the ends of the longest paths is empty: nothing was put there."
 
 
-def _parts(run: Run, pictures: Pictures):
+def _went_in(run: Run) -> Section:
     panorama = run.result.panorama
     near, far = colour_range(panorama.distance, panorama.valid)
     depth = colour_map(panorama.distance, panorama.valid, near, far)
@@ -116,7 +135,11 @@ def _parts(run: Run, pictures: Pictures):
     if run.in_doubt:
         caption += f" The third picture is doubt: bright where the distance may be wrong by {DOUBTFUL:.0%} or more."
         pictures_in += (_jpeg("doubt", colour_map(panorama.doubt, panorama.valid, 0.0, DOUBTFUL)),)
-    yield Section("What went in", caption, pictures_in, scale=(float(near), float(far)), wide=True)
+    return Section("What went in", caption, pictures_in, scale=(float(near), float(far)), wide=True)
+
+
+def _parts(run: Run, pictures: Pictures):
+    yield _went_in(run)
     for order, index in enumerate(longest(run.result.trajectories)):
         yield _path(run.result, index, pictures.coarse_ends[order], pictures.refined_ends[order])
     for index in _shown_views(run.views, pictures.refined_views):
