@@ -12,8 +12,9 @@ import numpy as np
 
 from experiments.config import dump_config
 from experiments.machine import machine_bytes
-from experiments.reconstruct.budget import OUT_OF_TIME, Clock, check_memory, within
+from experiments.reconstruct.budget import OUT_OF_TIME, Clock, check_memory, foreseen_bytes, within
 from experiments.reconstruct.config import ReconstructConfig
+from experiments.reconstruct.forecast import SecondsForecast
 from experiments.reconstruct.inputs import input_fingerprint, input_views, levelled_views, told_panorama, working_rows
 from experiments.reconstruct.outputs import write_outputs
 from experiments.reconstruct.pages.first_look import write_first_look
@@ -70,16 +71,23 @@ def run_job(config: ReconstructConfig, *, resume: bool = False) -> dict:
     """Run the job; returns what metrics.json holds. Raises InputError for whatever is wrong with the input."""
     clock, output = Clock(config.budget), Path(config.output)
     views = input_views(config.input)  # a bad view is found before the long part
-    check_memory(working_rows(config.input), machine_bytes())
-    files = input_fingerprint(config.input)
+    rows = working_rows(config.input)
+    check_memory(rows, machine_bytes())
+    files, forecast = (
+        input_fingerprint(config.input),
+        SecondsForecast(config, rows, upsampled=_as_it_is(config)[1] < rows),
+    )
+    foreseen = {"foreseen_seconds": forecast.seconds(), "foreseen_bytes": foreseen_bytes(rows)}
     write_text(output / "config.toml", _header() + dump_config(config))
     config = within(config, config.budget)
-    with Progress(config) as progress:
+    with Progress(config, **foreseen) as progress:
         store = StageStore(output / "stages", config.refine, resume=resume)
         job = _Job(config, store, progress, clock)
         *made, lean = _stages(job, files)
-        metrics = write_outputs(Run(config, *made, levelled_views(views, lean), lean), store, clock)
+        metrics = write_outputs(Run(config, *made, levelled_views(views, lean), lean), store, clock, foreseen)
         progress.finish(output, metrics)
+    if not any(stage.found for stage in store.finished):
+        forecast.remember(metrics["seconds"], metrics["program_seconds"])
     return metrics
 
 
@@ -124,14 +132,20 @@ def _read(job: _Job):
     """The panorama, whether its distance was estimated, what was done to a given one, how it leaned. While the network
     makes it finer, what it is shows itself."""
     config = job.config
-    as_it_is = dataclasses.replace(config, input=dataclasses.replace(config.input, upsample=NONE))
-    if working_rows(as_it_is.input) == working_rows(config.input):
+    as_it_is, rows = _as_it_is(config)
+    if rows == working_rows(config.input):
         return _told(config)
     with ThreadPoolExecutor(1) as beside:
         finer = beside.submit(_told, config)
         panorama, *about = _told(as_it_is)
         job.look(survey(panorama, dataclasses.replace(config, lift=LiftConfig())), about)
         return finer.result()
+
+
+def _as_it_is(config: ReconstructConfig) -> tuple[ReconstructConfig, int]:
+    """The config without upsampling the picture, and its working rows."""
+    plain = dataclasses.replace(config, input=dataclasses.replace(config.input, upsample=NONE))
+    return plain, working_rows(plain.input)
 
 
 def _told(config: ReconstructConfig):

@@ -2,7 +2,6 @@
 would miss them."""
 
 import json
-import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -14,11 +13,11 @@ from experiments.config import recipe_digest
 from experiments.reconstruct import run_metrics
 from experiments.reconstruct.budget import Clock
 from experiments.reconstruct.flythrough import flythrough
+from experiments.reconstruct.pages.run_report import longest, run_report
+from experiments.reconstruct.pages.viewer_page import viewer_page
 from experiments.reconstruct.quality import quality, render_views
 from experiments.reconstruct.run import Pictures, Run
-from experiments.reconstruct.pages.run_report import longest, run_report
 from experiments.reconstruct.stage_store import StageStore
-from experiments.reconstruct.pages.viewer_page import viewer_page
 from rein3d_jax.evaluate.coverage import coverage
 from rein3d_jax.explore.trajectories import Trajectories, path_ends
 from rein3d_jax.io.files.atomic import write_text
@@ -31,12 +30,12 @@ from rein3d_jax.report.report import render_report
 from rein3d_jax.scene import Gaussians
 
 
-def write_outputs(run: Run, store: StageStore, clock: Clock) -> dict:
-    """Every file of the run's folder; returns what metrics.json holds."""
-    begun, config, result, output = time.perf_counter(), run.config, run.result, Path(run.config.output)
-    write_ply(output / "scene.ply", result.scene, antialias=config.rasterize.antialias)
-    scenes = _alike(result.coarse, result.scene)
-    with ThreadPoolExecutor(1) as beside:  # a processor has two cores, and a picture takes one
+def write_outputs(run: Run, store: StageStore, clock: Clock, foreseen: dict) -> dict:
+    """Every file of the run's folder; returns what metrics.json holds, `foreseen` among it."""
+    config, result, output = run.config, run.result, Path(run.config.output)
+    with store.timed("write"), ThreadPoolExecutor(1) as beside:  # a processor has two cores, and a picture takes one
+        write_ply(output / "scene.ply", result.scene, antialias=config.rasterize.antialias)
+        scenes = _alike(result.coarse, result.scene)
         film = beside.submit(_write_film, scenes[-1], run)
         write_text(output / "viewer.html", viewer_page(run))
         truths = render_views(scenes, run.views, run.backdrop, config=config.rasterize)
@@ -44,7 +43,8 @@ def write_outputs(run: Run, store: StageStore, clock: Clock) -> dict:
         (coarse_ends, seen), (refined_ends, covered) = (_panoramas(scene, ends, run) for scene in scenes)
         film.result()
     metrics = {
-        **run_metrics.cost(store, len(result.panorama.rgb)),
+        **run_metrics.cost(store, clock.elapsed()),
+        **foreseen,
         **run_metrics.size(result, output / "scene.ply"),
         **run_metrics.trouble(result),
         **run_metrics.choices(result, store, config.explore),
@@ -55,8 +55,6 @@ def write_outputs(run: Run, store: StageStore, clock: Clock) -> dict:
     }
     if run.views:
         metrics["quality"] = {n: quality(p, run.views) for n, p in zip(("coarse", "refined"), truths, strict=True)}
-    metrics["seconds"]["write"] = round(time.perf_counter() - begun, 3)
-    metrics["seconds"]["total"] = round(clock.elapsed(), 3)
     pictures = Pictures(coarse_ends, refined_ends, *truths)
     write_text(output / "report.html", render_report(run_report(run, pictures, metrics)))
     write_text(output / "metrics.json", json.dumps(metrics, indent=2) + "\n")

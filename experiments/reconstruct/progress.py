@@ -8,19 +8,19 @@ from rich.progress import Progress as Bars
 
 from experiments.reconstruct.stage_store import Finished
 
-_STAGE_COST = {"read": 8, "lift": 5, "explore": 2, "peel": 8, "restore": 16}  # in refinement steps, on a laptop's CPU
-
 
 class Progress:
-    """One bar over the whole job. Work is counted in refinement steps; other stages by what they cost of those."""
+    """One bar over the whole job, in foreseen seconds."""
 
-    def __init__(self, config):
+    def __init__(self, config, *, foreseen_seconds: dict[str, float], foreseen_bytes: int):
         self.console = Console(highlight=False, soft_wrap=True)
         columns = (TextColumn("{task.description:<12}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
         self.bars = Bars(*columns, console=self.console, transient=True)
-        paths = config.explore.trajectories
-        total = sum(_STAGE_COST.values()) + (paths - 1) * _STAGE_COST["restore"] + config.refine.steps
-        self.task, self.before_steps, self.looked = self.bars.add_task("reading", total=total), 0, False
+        self.seconds, self.passed, self.looked = foreseen_seconds, 0.0, False
+        self.paths, self.steps = config.explore.trajectories, max(config.refine.steps, 1)
+        self.task = self.bars.add_task("reading", total=foreseen_seconds["total"])
+        total, memory = foreseen_seconds["total"], foreseen_bytes / 2**30
+        self.console.print(f"this will take about {total:.0f} s and {memory:.1f} GiB of memory")
 
     def __enter__(self):
         self.bars.start()
@@ -32,8 +32,9 @@ class Progress:
     def done(self, stage: Finished) -> None:
         """A stage is finished, or was found finished."""
         self.console.print(f"{stage.name:<12} {'found finished' if stage.found else f'{stage.seconds:.1f} s'}")
-        self.before_steps += _STAGE_COST.get(stage.name.split("-")[0], 0)
-        self.bars.update(self.task, completed=self.before_steps, description=f"after {stage.name}")
+        kind = stage.name.split("-")[0]
+        self.passed += self.seconds[kind] / (self.paths if kind == "restore" else 1)
+        self.bars.update(self.task, completed=self.passed, description=f"after {stage.name}")
 
     def look(self, output: Path) -> None:
         """There is something to see; told once."""
@@ -43,7 +44,8 @@ class Progress:
 
     def step(self, number: int) -> None:
         """`number` refinement steps are done."""
-        self.bars.update(self.task, completed=self.before_steps + number, description="refine")
+        completed = self.passed + self.seconds["refine"] * number / self.steps
+        self.bars.update(self.task, completed=completed, description="refine")
 
     def finish(self, output: Path, metrics: dict) -> None:
         """The last lines: what came out, and what to open."""

@@ -3,18 +3,25 @@
 import resource
 from pathlib import Path
 
-from experiments.reconstruct.budget import foreseen_bytes
 from experiments.reconstruct.stage_store import StageStore
 from rein3d_jax.depth.level import Lean
 from rein3d_jax.explore.profile import ExploreConfig
 from rein3d_jax.pipeline.reconstruct import Reconstruction
 
 
-def cost(store: StageStore, rows: int) -> dict:
-    """Seconds by stage, and the most memory that the process held, beside what was foreseen for so many rows."""
-    seconds = {**{name: round(value, 3) for name, value in store.seconds().items()}, "write": 0.0, "total": 0.0}
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    return {"seconds": seconds, "peak_bytes": peak, "foreseen_bytes": foreseen_bytes(rows)}
+def cost(store: StageStore, total: float) -> dict:
+    """Seconds by stage; of these for programs, traced and compiled; the processor's; the most memory held."""
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    return {
+        "seconds": _rounded(store.seconds() | {"total": total}),
+        "program_seconds": {part: _rounded(of) for part, of in store.programs().items()},
+        "cpu_seconds": round(used.ru_utime + used.ru_stime, 1),
+        "peak_bytes": used.ru_maxrss * 1024,
+    }
+
+
+def _rounded(seconds: dict[str, float]) -> dict[str, float]:
+    return {name: round(value, 3) for name, value in seconds.items()}
 
 
 def size(result: Reconstruction, ply: Path) -> dict:

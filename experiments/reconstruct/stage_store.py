@@ -4,13 +4,15 @@ import dataclasses
 import hashlib
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
+from experiments.compile_clock import program_seconds
 from rein3d_jax.depth.level import Lean
 from rein3d_jax.errors import InputError
 from rein3d_jax.explore.trajectories import Trajectories
@@ -50,6 +52,7 @@ class Finished:
     name: str
     seconds: float  # that it took when it was made
     found: bool  # made by an earlier job
+    programs: dict[str, float]  # seconds of these for tracing and for compiling; none where it was found
 
 
 class StageStore:
@@ -68,6 +71,7 @@ class StageStore:
         path, like = self.folder / f"{name}.npz", self.blanks[name.split("-")[0]]
         stored = self._stored(path, like) if self.resume else None
         found = stored is not None
+        programs = program_seconds()
         if not found:
             started = time.perf_counter()
             result = make()
@@ -75,8 +79,19 @@ class StageStore:
             (self.folder / f"{UNFINISHED}.npz").unlink(missing_ok=True)
             # A fresh run goes on with what a resumed one would read: the same bytes either way.
             stored = load(path, _shape(like))
-        self.finished.append(Finished(name, float(stored["seconds"]), found))
+        self._finish(name, float(stored["seconds"]), programs, found=found)
         return stored["result"]
+
+    @contextmanager
+    def timed(self, name: str) -> Iterator[None]:
+        """Counts what is done within as a stage, of which nothing is saved."""
+        programs, started = program_seconds(), time.perf_counter()
+        yield
+        self._finish(name, time.perf_counter() - started, programs, found=False)
+
+    def _finish(self, name: str, seconds: float, programs_before: dict[str, float], *, found: bool) -> None:
+        programs = {kind: total - programs_before[kind] for kind, total in program_seconds().items()}
+        self.finished.append(Finished(name, seconds, found, programs))
 
     def save_unfinished(self, snapshot: Snapshot) -> None:
         """What the stage being made has so far, for `unfinished`."""
@@ -89,10 +104,17 @@ class StageStore:
 
     def seconds(self) -> dict[str, float]:
         """By kind of stage."""
+        return self._summed(lambda stage: stage.seconds)
+
+    def programs(self) -> dict[str, dict[str, float]]:
+        """{"trace", "compile"}: of these seconds, by kind of stage."""
+        return {part: self._summed(lambda stage, part=part: stage.programs[part]) for part in program_seconds()}
+
+    def _summed(self, of: Callable[[Finished], float]) -> dict[str, float]:
         total: dict[str, float] = {}
         for stage in self.finished:
             kind = stage.name.split("-")[0]
-            total[kind] = total.get(kind, 0.0) + stage.seconds
+            total[kind] = total.get(kind, 0.0) + of(stage)
         return total
 
     def _save(self, path: Path, result: Any, seconds: float) -> None:

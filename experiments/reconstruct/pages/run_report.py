@@ -6,9 +6,9 @@ from importlib.resources import files
 import jax.numpy as jnp
 import numpy as np
 
+from experiments.reconstruct.pages.sources import sources
 from experiments.reconstruct.quality import is_novel
 from experiments.reconstruct.run import Pictures, Run
-from experiments.reconstruct.pages.sources import sources
 from rein3d_jax.explore.hidden import DOUBTFUL
 from rein3d_jax.explore.profile import ExploreConfig, travel
 from rein3d_jax.explore.trajectories import Trajectories
@@ -54,8 +54,8 @@ def first_report(run: Run) -> Report:
     """The report of a run that has surveyed the panorama, and goes on."""
     return Report(
         title="Your room in 3D: a first look",
-        summary="What the panorama saw, lifted to 3D: open viewer.html. What things hide is still black; the job goes on, "
-        "and puts what it finds in the place of both pages.",
+        summary="What the panorama saw, lifted to 3D: open viewer.html. What things hide is still black. The job goes "
+        "on, and will replace both pages.",
         facts=(("Gaussians", f"{int(run.result.coarse.alive.sum()):,}"),),
         distance_origin=_distance_origin(run),
         warnings=tuple(_warnings_of_input(run)),

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from experiments.reconstruct.run import Run
 from experiments.reconstruct.pages.run_report import room_plan
+from experiments.reconstruct.run import Run
 from rein3d_jax.explore.trajectories import path_ends
 from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.io.pictures.image import encode_jpeg

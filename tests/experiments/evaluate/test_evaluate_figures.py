@@ -122,7 +122,8 @@ def test_a_chart_compares_the_same_rooms(tmp_path, capsys):
 
 def test_what_the_report_compares_with_is_the_committed_results():
     """After new ones, in benchmarks/results: python -m experiments.evaluate
-    --chart evaluate.json evaluate_draft.json evaluate_quick.json --points ../../experiments/reconstruct/pages/measured.json
+    --chart evaluate.json evaluate_draft.json evaluate_quick.json
+    --points ../../experiments/reconstruct/pages/measured.json
     """
     results = ROOT / "benchmarks" / "results"
     rooms, panels = chart_points([results / f"evaluate{name}.json" for name in ("", "_draft", "_quick")])

@@ -9,12 +9,12 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-from experiments.reconstruct.pages import viewer_page as viewer
 from experiments.reconstruct.inputs import SAMPLES, InputConfig
-from experiments.reconstruct.run import Pictures, Run
+from experiments.reconstruct.pages import viewer_page as viewer
 from experiments.reconstruct.pages.run_report import longest, run_report
 from experiments.reconstruct.pages.sources import sources
 from experiments.reconstruct.pages.viewer_page import viewer_page
+from experiments.reconstruct.run import Pictures, Run
 from experiments.run_folder import open_run
 from rein3d_jax.depth.estimate import DepthConfig
 from rein3d_jax.depth.level import unasked_lean

@@ -1,0 +1,120 @@
+"""What the main job takes, as a user meets it: whole processes, the first on a machine and the ones after it.
+
+CPU seconds (user and system) of each, wall seconds, seconds until viewer.html is first there, and by stage how much went
+into tracing, compiling and the work itself; medians over rounds. `--beside` runs another checkout of the project in
+turn, `--rows` a photo at several sizes.
+
+    python -m benchmarks.time --json benchmarks/results/time.json [--recipes quick,draft] [--beside FOLDER]
+    python -m benchmarks.time --photo pano.jpg --rows 128,256,512,1024 --json FILE
+"""
+
+import json
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from experiments.command import CommandParser
+from rein3d_jax.errors import InputError
+from rein3d_jax.io.files.atomic import write_text
+
+HERE = Path(__file__).resolve().parents[1]
+_LOOK = 0.1  # seconds between looks for viewer.html
+
+
+def run_job(project: Path, cache: Path, *arguments: str) -> dict:
+    """One job of the project's in a process of its own, with the compiled programs in `cache`. Raises RuntimeError with
+    what it said where it fails."""
+    with tempfile.TemporaryDirectory() as folder:
+        output = Path(folder) / "run"
+        command = [sys.executable, "-m", "experiments.reconstruct", "--output", str(output), *arguments]
+        environment = {**os.environ, "JAX_COMPILATION_CACHE_DIR": str(cache)}
+        before, started, seen = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter(), None
+        process = subprocess.Popen(
+            command, cwd=project, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+        while process.poll() is None:
+            if seen is None and (output / "viewer.html").exists():
+                seen = time.perf_counter() - started
+            time.sleep(_LOOK)
+        wall, after = time.perf_counter() - started, resource.getrusage(resource.RUSAGE_CHILDREN)
+        if process.returncode:
+            raise RuntimeError(process.stdout.read())
+        metrics = json.loads((output / "metrics.json").read_text())
+    cpu = sum(getattr(after, of) - getattr(before, of) for of in ("ru_utime", "ru_stime"))
+    found = {"cpu_s": cpu, "wall_s": wall, "first_viewer_s": wall if seen is None else seen}
+    found |= {"peak_bytes": metrics["peak_bytes"], "gaussians": metrics["count"]["refined"]}
+    found |= {"psnr": metrics["quality"]["refined"]["psnr"]} if "quality" in metrics else {}
+    return found | {"stages": _by_stage(metrics), "foreseen_s": metrics.get("foreseen_seconds", {}).get("total")}
+
+
+def _by_stage(metrics: dict) -> dict[str, dict[str, float]]:
+    """Seconds of each stage, and of these for tracing and for compiling, where the job tells."""
+    programs = metrics.get("program_seconds", {})
+    parts = {"seconds": metrics["seconds"], **programs}
+    return {stage: {part: of[stage] for part, of in parts.items() if stage in of} for stage in metrics["seconds"]}
+
+
+def measure(projects: dict[str, Path], jobs: dict[str, list[str]], rounds: int) -> dict:
+    """{project: {job: {"first", "second"}}}: medians over rounds, the projects in turn; a round's first job of each
+    kind begins with an empty cache."""
+    found: dict = {name: {job: {"first": [], "second": []} for job in jobs} for name in projects}
+    for _ in range(rounds):
+        for job, arguments in jobs.items():
+            for name, project in projects.items():
+                with tempfile.TemporaryDirectory() as cache:
+                    for turn in ("first", "second"):
+                        row = run_job(project, Path(cache), *arguments)
+                        found[name][job][turn].append(row)
+                        print(f"{name:10} {job:14} {turn:7} {_line(row)}", flush=True)
+    return {n: {j: {t: _median(rows) for t, rows in of.items()} for j, of in by.items()} for n, by in found.items()}
+
+
+def _line(row: dict) -> str:
+    return f"{row['cpu_s']:6.1f} CPU s, {row['wall_s']:6.1f} s, first viewer after {row['first_viewer_s']:5.1f} s"
+
+
+def _median(rows: list[dict]) -> dict:
+    """Of figures alike in shape, the median of each number."""
+    if isinstance(rows[0], dict):
+        return {key: _median([row[key] for row in rows]) for key in rows[0]}
+    return None if rows[0] is None else round(statistics.median(rows), 4)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Exit code 0, or 2 with one line on stderr where an argument is at fault."""
+    parser = CommandParser("time", __doc__, "benchmarks")
+    parser.add_argument("--recipes", default="quick,draft", metavar="A,B", help="default: %(default)s")
+    parser.add_argument("--rounds", type=int, default=3, metavar="N", help="default: %(default)s")
+    parser.add_argument("--beside", metavar="FOLDER", help="another checkout of the project, run in turn")
+    parser.add_argument("--photo", metavar="FILE", help="instead of the recipes: quick with this panorama, by --rows")
+    parser.add_argument("--rows", default="128,256,512,1024", metavar="A,B", help="working rows (default: %(default)s)")
+    parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    return parser.run(_run, arguments)
+
+
+def _run(options) -> None:
+    if options.rounds < 1:
+        raise InputError(f"--rounds {options.rounds} must be at least 1")
+    jobs = {name: ["--config", name] for name in options.recipes.split(",")}
+    if options.photo:
+        photo = ["--input", str(Path(options.photo).resolve()), "--set"]
+        jobs = {f"{rows} rows": [*photo, f"input.height={rows}"] for rows in options.rows.split(",")}
+    projects = {"this": HERE} | ({"beside": Path(options.beside)} if options.beside else {})
+    found = measure(projects, jobs, options.rounds)
+    for name, of_jobs in found.items():
+        for job, turns in of_jobs.items():
+            for turn, row in turns.items():
+                print(f"{name:10} {job:14} {turn:7} {_line(row)}")
+    if options.json:
+        write_text(
+            Path(options.json), json.dumps({"cores": os.cpu_count(), "rounds": options.rounds} | found, indent=1) + "\n"
+        )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

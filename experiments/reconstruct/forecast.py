@@ -1,0 +1,107 @@
+"""What a job will take: seconds by stage, foreseen from its sizes, corrected by what jobs took on this machine before.
+
+A stage takes its share of the work, and makes its programs: compiled the first time, read from the cache afterwards.
+The model's numbers are those of one core of a 2.5 GHz Xeon; a short calibration says how fast this machine is, until a
+job has told by stage.
+"""
+
+import dataclasses
+import hashlib
+import json
+import time
+from pathlib import Path
+
+import jax
+import numpy as np
+
+from experiments.reconstruct.config import ReconstructConfig
+from rein3d_jax.io.files.atomic import write_text
+from rein3d_jax.upsample import LEARNED
+
+COUNTED = ("read", "lift", "explore", "peel", "restore", "refine", "write")
+# Seconds for programs, compiled and kept.
+_COMPILED = dict(zip(COUNTED, (18.0, 17.0, 0.7, 38.0, 7.0, 2.0, 18.0), strict=True))
+_KEPT = dict(zip(COUNTED, (2.0, 2.2, 0.1, 4.5, 1.0, 0.5, 2.5), strict=True))
+_NETWORK = 2.4  # seconds for the depth network
+_CALIBRATED = 0.072  # seconds that `_calibration` takes on the model's machine
+_FRAMES = 12  # of a path, on average
+
+
+class SecondsForecast:
+    """The seconds of one job; the file beside the kept programs remembers what jobs took."""
+
+    def __init__(self, config: ReconstructConfig, rows: int, *, upsampled: bool):
+        self.work = _work(config, rows, upsampled=upsampled)
+        self.looks = 1.5 if config.input.distance is None else 1.0  # the network's programs are read's, too
+        self.key = hashlib.sha256(repr((jax.__version__, rows, upsampled, _shaping(config))).encode()).hexdigest()[:16]
+        folder = jax.config.jax_compilation_cache_dir
+        self.file = None if folder is None else Path(folder) / "seconds.json"
+        self.known = {} if self.file is None else recalled(self.file)
+
+    def seconds(self) -> dict[str, float]:
+        """By stage, and their total."""
+        slowness, programs = self._slowness(), self.known.get(self.key) or self._programs(_COMPILED)
+        found = {stage: round(slowness[stage] * self.work[stage] + programs[stage], 1) for stage in COUNTED}
+        return found | {"total": round(sum(found.values()), 1)}
+
+    def remember(self, seconds: dict[str, float], programs: dict[str, dict[str, float]]) -> None:
+        """Keeps what a whole job took by stage, and how much of that for tracing and for compiling."""
+        if self.file is None:
+            return
+        made, slowness = {stage: sum(of[stage] for of in programs.values()) for stage in COUNTED}, self._slowness()
+        for stage in COUNTED:
+            if 2 * made[stage] < seconds[stage]:  # or what is left between two threads' compilers says little
+                slowness[stage] = (seconds[stage] - made[stage]) / self.work[stage]
+        # What was compiled now is read the next time.
+        compiled = sum(programs["compile"].values()) > sum(_KEPT.values())
+        following = self._programs(_KEPT) if compiled else made
+        write_text(self.file, json.dumps(self.known | {"slowness": slowness, self.key: following}))
+
+    def _slowness(self) -> dict[str, float]:
+        """Of this machine, by stage, against the model's."""
+        return self.known.get("slowness") or dict.fromkeys(COUNTED, _calibration() / _CALIBRATED)
+
+    def _programs(self, table: dict[str, float]) -> dict[str, float]:
+        return table | {"read": self.looks * table["read"]}
+
+
+def _work(config: ReconstructConfig, rows: int, *, upsampled: bool) -> dict[str, float]:
+    """Seconds of each stage without its programs, by the model, at so many working rows."""
+    pixels, restored = (2 * r * r / 1e6 for r in (rows, config.restore.height))  # million
+    paths, every = config.explore.trajectories, config.explore.min_revealed == 0
+    made_finer = 31 * pixels if config.input.upsample == LEARNED and upsampled else 0.0
+    views, film = 24 if config.input.views else 0, config.film.width * config.film.height / 1e6
+    size = 0.02 + 0.16 * config.lift.share * pixels  # to render a small picture of the scene
+    step = 0.03 + 4 * config.refine.views.size**2 / 1e6
+    return {
+        "read": 0.7 + 2 * pixels + made_finer + _NETWORK * (config.input.distance is None),
+        "lift": 0.3 + 1.0 * pixels,
+        "explore": 0.1,
+        "peel": 0.3 + 4 * restored if config.peel.room else 0.2,
+        "restore": paths * (0.1 + size + restored + every * _FRAMES * (size + 4 * restored)),
+        "refine": 0.3 + every * config.refine.steps * config.refine.batch * step,
+        "write": 2.0 + (20 + _FRAMES * paths) * (size + 0.1 * film) + 2 * views * size,
+    }
+
+
+def _shaping(config: ReconstructConfig) -> ReconstructConfig:
+    """The config without what changes no program."""
+    files = dataclasses.replace(config.input, panorama="", distance=config.input.distance and "given", views=None)
+    return dataclasses.replace(config, input=files, output="", seed=0)
+
+
+def recalled(file: Path) -> dict[str, dict[str, float]]:
+    """What a `SecondsForecast` kept in its file; {} where it cannot be read."""
+    try:
+        found = json.loads(file.read_text("utf-8"))
+        return found if all(set(by_stage) == set(COUNTED) for by_stage in found.values()) else {}
+    except (OSError, ValueError, TypeError, AttributeError):
+        return {}  # nothing is kept yet, or by another version
+
+
+def _calibration() -> float:
+    """Seconds of a little work of the kind that jobs do."""
+    numbers, started = np.linspace(0, 1e4, 1 << 20, dtype=np.float32), time.perf_counter()
+    for _ in range(16):
+        np.sort(np.sin(numbers))
+    return time.perf_counter() - started

@@ -1,0 +1,52 @@
+"""What a job is foreseen to take: more for more work, and what it took when it is run again."""
+
+import dataclasses
+
+import pytest
+
+from experiments.reconstruct.config import ReconstructConfig
+from experiments.reconstruct.forecast import COUNTED, SecondsForecast, recalled
+
+CONFIG = ReconstructConfig()
+SECONDS = {stage: 10.0 + i for i, stage in enumerate(COUNTED)} | {"total": 91.0}
+
+
+def forecast(tmp_path, config=CONFIG, rows=256, **changes) -> SecondsForecast:
+    made = SecondsForecast(dataclasses.replace(config, **changes), rows, upsampled=False)
+    made.file = tmp_path / "seconds.json"
+    made.known = recalled(made.file)
+    return made
+
+
+def programs(compiling: float) -> dict:
+    return {"trace": dict.fromkeys(COUNTED, 0.5), "compile": dict.fromkeys(COUNTED, compiling)}
+
+
+def test_twice_the_rows_take_longer_in_every_stage_that_sees_the_picture(tmp_path):
+    small, large = (forecast(tmp_path, rows=rows).work for rows in (256, 512))
+    assert all(large[stage] > small[stage] for stage in ("read", "lift", "restore", "write"))
+
+
+def test_what_a_job_took_is_foreseen_for_the_next_one_like_it(tmp_path):
+    forecast(tmp_path).remember(SECONDS, programs(0.2))
+    again = forecast(tmp_path).seconds()
+    assert {stage: again[stage] for stage in COUNTED} == pytest.approx({s: SECONDS[s] for s in COUNTED}, abs=0.1)
+
+
+def test_after_compiling_the_next_one_is_foreseen_to_be_faster(tmp_path):
+    forecast(tmp_path).remember(SECONDS, programs(4.0))
+    assert forecast(tmp_path).seconds()["total"] < SECONDS["total"] - 7 * 2
+
+
+def test_a_slower_machine_is_slower_for_other_sizes_too(tmp_path):
+    first = forecast(tmp_path, rows=512)
+    first.known = {"slowness": dict.fromkeys(COUNTED, 1.0)}
+    by_model = first.seconds()
+    forecast(tmp_path, rows=256).remember({s: 100 * x for s, x in SECONDS.items()}, programs(0.2))
+    assert forecast(tmp_path, rows=512).seconds()["lift"] > 5 * by_model["lift"]
+
+
+@pytest.mark.parametrize("content", ["", "[1]", '{"slowness": {"read": 1}}', '{"slowness": 3}'])
+def test_a_damaged_memory_is_no_memory(tmp_path, content):
+    (tmp_path / "seconds.json").write_text(content)
+    assert forecast(tmp_path).known == {}
