@@ -1,8 +1,8 @@
 """What the main job takes, as a user meets it: whole processes, the first on a machine and the ones after it.
 
-CPU seconds (user and system) of each, wall seconds, seconds until viewer.html is first there, and by stage how much went
-into tracing, compiling and the work itself; medians over rounds. `--beside` runs another checkout of the project in
-turn, `--rows` a photo at several sizes.
+CPU seconds (user and system) of each, wall seconds, seconds until viewer.html is first there, and by stage how much
+went into tracing, compiling and the work itself; medians over rounds. `--beside` runs another checkout of the project
+in turn, `--rows` a photo at several sizes.
 
     python -m benchmarks.time --json benchmarks/results/time.json [--recipes quick,draft] [--beside FOLDER]
     python -m benchmarks.time --photo pano.jpg --rows 128,256,512,1024 --json FILE
