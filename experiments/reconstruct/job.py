@@ -56,8 +56,11 @@ class _Job:
         return result
 
     def look(self, known: Survey, about: Sequence) -> None:
-        """Writes the pages of what is known, for the first look; `about` is whether the distance was estimated, what
-        was done to a given one, and how the picture leaned."""
+        """Writes the pages of what is known, for the first look, unless those of an earlier job stand there: they stay
+        until this one has better. `about` is whether the distance was estimated, what was done to a given one, and how
+        the picture leaned."""
+        if not self.progress.looked and (Path(self.config.output) / "viewer.html").exists():
+            return
         estimated, told, lean = about
         write_first_look(Run(self.config, known, bool(estimated), told, [], lean))
         self.progress.look(Path(self.config.output))
@@ -73,10 +76,8 @@ def run_job(config: ReconstructConfig, *, resume: bool = False) -> dict:
     views = input_views(config.input)  # a bad view is found before the long part
     rows = working_rows(config.input)
     check_memory(rows, machine_bytes())
-    files, forecast = (
-        input_fingerprint(config.input),
-        SecondsForecast(config, rows, upsampled=_as_it_is(config)[1] < rows),
-    )
+    files = input_fingerprint(config.input)
+    forecast = SecondsForecast(config, rows, upsampled=_as_it_is(config)[1] < rows)
     foreseen = {"foreseen_seconds": forecast.seconds(), "foreseen_bytes": foreseen_bytes(rows)}
     write_text(output / "config.toml", _header() + dump_config(config))
     config = within(config, config.budget)

@@ -11,6 +11,7 @@ import pytest
 
 from experiments.config import load_config
 from experiments.reconstruct import __main__ as job
+from experiments.reconstruct import job as stages
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.inputs import SAMPLES, InputConfig, input_panorama, input_views
 from experiments.reconstruct.quality import is_novel
@@ -214,6 +215,33 @@ def test_bad_input_is_one_clear_line_and_exit_2(recipe, tmp_path, capsys, name):
     assert job.main(["--config", str(recipe), *output, *arguments]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1 and word in lines[0] and "Traceback" not in lines[0], lines
+
+
+@pytest.fixture
+def stopped(recipe, tmp_path, monkeypatch):
+    """Runs a job into the folder that is returned, up to where things behind things are made up."""
+    monkeypatch.setattr(stages, "peel_scene", lambda *_, **__: 1 / 0)
+
+    def run():
+        with pytest.raises(ZeroDivisionError):
+            job.main(["--config", str(recipe), "--output", str(tmp_path)])
+        return tmp_path
+
+    return run
+
+
+def test_there_is_something_to_see_before_anything_is_guessed(stopped, capsys):
+    output = stopped()
+    assert capsys.readouterr().out.count("for a first look") == 1
+    assert "a first look" in (output / "report.html").read_text()
+    shown = (output / "viewer.html").read_text()
+    assert shown.count('"name": "Coarse"') == 1 and '"name": "Refined"' not in shown
+
+
+def test_what_an_earlier_job_shows_stays_until_there_is_better(stopped, tmp_path):
+    (tmp_path / "viewer.html").write_text("an earlier job's")
+    stopped()
+    assert (tmp_path / "viewer.html").read_text() == "an earlier job's"
 
 
 def test_a_disk_that_fills_up_loses_nothing_already_written(finished, recipe, tmp_path, capsys):
