@@ -33,7 +33,8 @@ from rein3d_jax.geometry.shell import FACES, meet_shell
 from rein3d_jax.geometry.sphere import pixel_rays, pixel_solid_angles
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.pictures.distance import read_distance
-from rein3d_jax.io.pictures.image import read_rgb, resize_panorama, write_rgb
+from rein3d_jax.io.pictures.image import resize_panorama, write_rgb
+from rein3d_jax.io.pictures.photo import read_rgb
 from rein3d_jax.networks.depth import SHIPPED_DEPTH, read_depth_network
 from rein3d_jax.scene import Panorama
 

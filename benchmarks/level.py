@@ -19,7 +19,7 @@ import numpy as np
 from experiments.command import CommandParser
 from rein3d_jax.depth.level import NOT_TOLD, Lean, estimate_lean, level_panorama
 from rein3d_jax.io.files.atomic import write_text
-from rein3d_jax.io.pictures.image import read_rgb
+from rein3d_jax.io.pictures.photo import read_rgb
 from rein3d_jax.scene import Panorama
 
 LEANS = (0, 2, 4, 8, 12)  # degrees

@@ -48,7 +48,7 @@ HOMES = {
     "orbax": ("rein3d_jax/io/files/",),
     "trimesh": ("rein3d_jax/io/meshes/",),
     "skimage": ("rein3d_jax/io/meshes/surface_mesh.py",),
-    "PIL": ("rein3d_jax/io/meshes/",),  # trimesh's pictures
+    "PIL": ("rein3d_jax/io/pictures/colour_profile.py", "rein3d_jax/io/meshes/"),  # trimesh's pictures
     "safetensors": ("rein3d_jax/io/weights/",),
     "matplotlib": ("experiments/evaluate/chart.py", "experiments/ablate/chart.py"),
     "array_record": ("rein3d_jax/io/pairs/",),

@@ -26,8 +26,9 @@ from rein3d_jax.depth.level import LEANED, levelled
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.pictures.distance import write_distance_exr
-from rein3d_jax.io.pictures.image import panorama_rows, write_rgb
+from rein3d_jax.io.pictures.image import write_rgb
 from rein3d_jax.io.pictures.panorama import read_panorama
+from rein3d_jax.io.pictures.photo import panorama_rows
 from rein3d_jax.networks.depth import read_depth_network
 from rein3d_jax.networks.upsampler import read_upsampler
 from rein3d_jax.pipeline.survey import with_distance

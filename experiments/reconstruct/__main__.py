@@ -19,8 +19,9 @@ from rein3d_jax.errors import InputError
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Exit code 0, or 2 with one line on stderr where the input is at fault."""
+    """Exit code 0; with one line on stderr 2 where the input or the machine is at fault, or 130 after Ctrl-C."""
     parser = CommandParser("reconstruct", __doc__)
+    parser.lighter = "lower input.height, lift.share or budget.gaussians"
     parser.add_argument("panorama", nargs="?", metavar="PANORAMA", help="the same as --input")
     parser.add_argument("--input", metavar="FILE", help="an equirectangular JPEG, PNG, EXR or HDR (2:1)")
     parser.add_argument("--distance", metavar="FILE", help="metres along each ray: EXR, 16-bit PNG (mm), NPY or NPZ")

@@ -30,6 +30,8 @@ def given_distance(
     (values, valid), told = numbers, []
     if len(values) != len(rgb):
         told.append("the map is {}x{}, brought to {}x{}".format(*values.shape[::-1], *rgb.shape[1::-1]))
+    if path.suffix.lower() == ".png":
+        told.append("its whole numbers are taken for millimetres, or for input.distance_unit")
     if kind != "distance":
         told.append(f"taken for {_MEANS[kind]}")
     placed = along_ray(Panorama(rgb, values, valid), kind)
@@ -58,7 +60,10 @@ def in_metres(panorama: Panorama, path: Path, camera_height: float | None) -> tu
         panorama = panorama.replace(distance=panorama.distance * factor)
         told = f"multiplied by {factor:.4g}, so that the floor lies {camera_height} m below the camera"
     if wrong := implausible_size(panorama):
-        other = "divide it by its units in a metre, or set input.distance_kind = relative and input.camera_height"
+        other = (
+            "set input.distance_unit to the metres of one of its units (Matterport3D: 0.00025, Stanford 2D-3D-S: "
+            "0.001953125), or input.distance_kind = relative and input.camera_height"
+        )
         mend = other if camera_height is None else "check input.camera_height, in metres"
         raise InputError(f"{path} has {wrong}; {mend}")
     return panorama, told

@@ -11,13 +11,15 @@ import jax.numpy as jnp
 from experiments.reconstruct.given_distance import given_distance, in_metres
 from rein3d_jax.conventions import EYE_HEIGHT
 from rein3d_jax.depth.kinds import DISTANCE_KINDS, METRIC_KINDS
-from rein3d_jax.depth.level import Lean, estimate_lean, levelled, unasked_lean
+from rein3d_jax.depth.level import Lean, estimate_lean, lean_of, levelled, unasked_lean
 from rein3d_jax.errors import InputError
+from rein3d_jax.evaluate.coverage import coverage
 from rein3d_jax.geometry.poses import rigid
 from rein3d_jax.io.files.input_file import require_file
 from rein3d_jax.io.pictures.distance import read_distance
-from rein3d_jax.io.pictures.image import panorama_rows
-from rein3d_jax.io.pictures.panorama import read_panorama
+from rein3d_jax.io.pictures.gpano import Pose
+from rein3d_jax.io.pictures.panorama import whole_colours
+from rein3d_jax.io.pictures.photo import panorama_rows, read_photo
 from rein3d_jax.io.rooms import traced_room
 from rein3d_jax.io.rooms.traced_room import View
 from rein3d_jax.scene import Panorama
@@ -47,6 +49,9 @@ class InputConfig(Settings):
         NONE, "doubles a smaller picture's rows, before all else, while height allows", among=(NONE, BICUBIC, LEARNED)
     )
     level: bool = setting(True, "a picture that leans is levelled before all else; false: it is taken as level")
+    pose: str = setting(
+        "believe", "GPano tags of roll and pitch, before what the picture's lines say", among=("believe", "ignore")
+    )
     camera_height: float | None = setting(
         None, f"of the lens above the floor: the scale; none: {EYE_HEIGHT}, a guess", within="(0, inf)", unit="metres"
     )
@@ -54,6 +59,9 @@ class InputConfig(Settings):
         "distance",
         "along rays; planar z of cube faces; inverse distance, or distance, up to a factor",
         among=DISTANCE_KINDS,
+    )
+    distance_unit: float | None = setting(
+        None, "of the map's numbers; none: metres, or millimetres of whole numbers", within="(0, inf)", unit="metres"
     )
     scale: str = setting(
         "metres",
@@ -101,21 +109,23 @@ def input_panorama(config: InputConfig, upsampler: dict | None = None) -> Panora
 
 
 def told_panorama(config: InputConfig, upsampler: dict | None = None) -> tuple[Panorama, str, Lean]:
-    """The same; what was done to a given distance to make it metres along the ray, in words, "" for nothing; and how
-    the picture leaned."""
+    """The same; what was made up in the picture, and done to a given distance to make it metres along the ray, in
+    words, "" for nothing; and how the picture leaned."""
     path = resolve(config.panorama)
     require_file(path)
     if config.distance is None:
-        rgb = _picture(path, config, upsampler)
+        rgb, pose, missing = _picture(path, config, upsampler)
         unknown = jnp.zeros(rgb.shape[:2])
-        panorama, lean = _levelled(Panorama(rgb, unknown, unknown > 0), config)
-        return panorama, "", lean
+        panorama, lean = _levelled(Panorama(rgb, unknown, unknown > 0), config, pose)
+        return panorama, missing, lean
     given, kind = resolve(config.distance), config.distance_kind
-    numbers = read_distance(given, metres=kind == "distance")  # a bad file is refused before the picture is upsampled
-    panorama, converted = given_distance(_picture(path, config, upsampler), numbers, given, kind)
-    panorama, lean = _levelled(panorama, config)  # a floor is looked for below
+    # A bad file is refused before the picture is upsampled.
+    numbers = read_distance(given, metres=kind == "distance", unit=config.distance_unit)
+    rgb, pose, missing = _picture(path, config, upsampler)
+    panorama, converted = given_distance(rgb, numbers, given, kind)
+    panorama, lean = _levelled(panorama, config, pose)  # a floor is looked for below
     panorama, scaled = in_metres(panorama, given, config.eye_height if config.scaled else None)
-    return panorama, "; ".join(filter(None, (converted, scaled))), lean
+    return panorama, "; ".join(filter(None, (missing, converted, scaled))), lean
 
 
 def working_rows(config: InputConfig) -> int:
@@ -125,17 +135,24 @@ def working_rows(config: InputConfig) -> int:
     return config.rows(panorama_rows(path))
 
 
-def _picture(path: Path, config: InputConfig, upsampler: dict | None) -> jax.Array:
-    """(h, 2 h, 3) at the rows to work at."""
-    rows = panorama_rows(path)
-    rgb = read_panorama(path, height=config.own_rows(rows)).rgb
+def _picture(path: Path, config: InputConfig, upsampler: dict | None) -> tuple[jax.Array, Pose, str]:
+    """The picture (h, 2 h, 3) at the rows to work at, the pose that its file tells, and what of it was made up."""
+    rows, photo = panorama_rows(path), read_photo(path)
+    rgb = jnp.asarray(whole_colours(photo, config.own_rows(rows)))
     for _ in range(config.doublings(rows)):
         rgb = upsample_picture(rgb, config.upsample, upsampler)
-    return rgb
+    unseen = 1 - float(coverage(jnp.asarray(photo.seen, jnp.float32)))
+    told = f"{unseen:.1%} of the picture is transparent, black at a pole or cropped away: it takes the colours around"
+    return rgb, photo.pose, told if unseen > 0 else ""
 
 
-def _levelled(panorama: Panorama, config: InputConfig) -> tuple[Panorama, Lean]:
-    lean = estimate_lean(panorama.rgb) if config.level else unasked_lean()
+def _levelled(panorama: Panorama, config: InputConfig, pose: Pose) -> tuple[Panorama, Lean]:
+    if not config.level:
+        lean = unasked_lean()
+    elif config.pose == "believe" and pose.leans:
+        lean = lean_of(pose.roll, pose.pitch)
+    else:
+        lean = estimate_lean(panorama.rgb)
     return levelled(panorama, lean), lean
 
 

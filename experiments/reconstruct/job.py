@@ -103,10 +103,10 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str, Lean]:
     config, key = job.config, jax.random.key(job.config.seed)
     weights = files_digest(SHIPPED_DEPTH) if config.asks_network else ""
     given = config.input
-    read = [given.height, given.level, given.eye_height, given.distance_kind, given.scale, given.upsample]
     depends = [
         files,
-        *read,
+        *(given.height, given.level, given.pose, given.eye_height, given.upsample),
+        *(given.distance_kind, given.distance_unit, given.scale),
         upsampler_fingerprint(given.upsample),
         job.settings("depth"),
         job.settings("shell"),

@@ -1,5 +1,6 @@
 """What a person sees while the job runs: a bar with the time left on a terminal, a line for each stage anywhere."""
 
+import sys
 from pathlib import Path
 
 from rich.console import Console
@@ -13,7 +14,9 @@ class Progress:
     """One bar over the whole job, in foreseen seconds."""
 
     def __init__(self, config, *, foreseen_seconds: dict[str, float], foreseen_bytes: int):
-        self.console = Console(highlight=False, soft_wrap=True)
+        plain = {"highlight": False, "soft_wrap": True, "markup": False, "emoji": False}  # a path may hold [b] or :on:
+        # A log takes no control codes, whatever FORCE_COLOR says.
+        self.console = Console(**plain, force_terminal=sys.stdout.isatty())
         columns = (TextColumn("{task.description:<12}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
         self.bars = Bars(*columns, console=self.console, transient=True)
         self.seconds, self.passed, self.looked = foreseen_seconds, 0.0, False

@@ -11,7 +11,7 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.sphere import WORLD_FROM_CAMERA_AXES, rays_of_pose64
 from rein3d_jax.io.files.json_file import read_json
 from rein3d_jax.io.files.npy import read_arrays
-from rein3d_jax.io.pictures.image import read_rgb
+from rein3d_jax.io.pictures.photo import read_rgb
 
 _SEEN_AGAIN = 2  # every so many panoramas of a walk are taken: those between show the same
 

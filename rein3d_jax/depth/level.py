@@ -35,6 +35,7 @@ _APART = 6.0  # degrees beyond which another up is a rival, and no longer the sa
 _LEVEL = 1.5  # degrees; below it a picture is left alone: upright ones are read off by up to 1.4
 _FEW = 0.01  # share of the sphere: an up that fewer edges support is not believed however alone it stands
 _PLAIN = 0.045  # confidence below which the lean is not believed: noise has up to 0.034, rooms have 0.064 and more
+_TOLD, _SLIGHT = 2.0, 0.05  # confidence of a lean that the file tells, and degrees of one that is none
 LEANED, STOOD_LEVEL, NOT_TOLD, NOT_ASKED = "leaned", "level", "unknown", "not asked"
 
 
@@ -43,7 +44,8 @@ class Lean:
     """Where a picture's room has its up, and how plain that is."""
 
     up: jax.Array  # (3,) unit, in the picture's axes: those of `pixel_rays`, as if it stood level
-    confidence: jax.Array  # () share of its support by which the best up beats the next, in [0, 1]; -1: nobody asked
+    confidence: jax.Array  # () share of its support by which the best up beats the next, in [0, 1]; -1: nobody asked;
+    # _TOLD: the file tells it
 
     @property
     def degrees(self) -> float:
@@ -67,7 +69,12 @@ class Lean:
             return NOT_ASKED
         if not float(self.confidence) > _PLAIN:
             return NOT_TOLD
-        return LEANED if self.degrees > _LEVEL else STOOD_LEVEL
+        return LEANED if self.degrees > (_SLIGHT if self.told else _LEVEL) else STOOD_LEVEL
+
+    @property
+    def told(self) -> bool:
+        """Whether the file tells it."""
+        return float(self.confidence) >= _TOLD
 
     @property
     def level_from_picture(self) -> jax.Array:
@@ -82,8 +89,9 @@ class Lean:
     def sentence(self) -> str:
         """What was found and done, for a person."""
         parts = f"roll {self.roll:+.1f}, pitch {self.pitch:+.1f}"
+        source = ", as its file tells," if self.told else ""
         return {
-            LEANED: f"The photograph leaned by {self.degrees:.1f} degrees ({parts}) and was levelled.",
+            LEANED: f"The photograph leaned by {self.degrees:.1f} degrees ({parts}){source} and was levelled.",
             STOOD_LEVEL: f"The photograph stood level, within {_LEVEL} degrees, and was left as it is.",
             NOT_TOLD: "Whether the photograph leans could not be told from its edges: it was left as it is.",
             NOT_ASKED: "The photograph was taken to stand level, as was asked.",
@@ -93,6 +101,13 @@ class Lean:
 def unasked_lean() -> Lean:
     """The lean of a picture that is taken to stand level."""
     return Lean(jnp.array([0.0, 0.0, 1.0]), jnp.array(-1.0))
+
+
+def lean_of(roll: float, pitch: float) -> Lean:
+    """The lean that a file tells: degrees by which the camera leaned to its right, and pointed above the horizon."""
+    roll, pitch = np.radians([roll, pitch])
+    up = [np.sin(pitch), np.cos(pitch) * np.sin(roll), np.cos(pitch) * np.cos(roll)]
+    return Lean(jnp.array(up, jnp.float32), jnp.array(_TOLD))
 
 
 def levelled(panorama: Panorama, lean: Lean) -> Panorama:

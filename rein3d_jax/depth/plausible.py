@@ -6,11 +6,15 @@ noise, with 3 % and with waves of 5 %: the kind was told right each time, and so
 
 import numpy as np
 
+from rein3d_jax.conventions import EYE_HEIGHT
 from rein3d_jax.depth.kinds import along_ray
+from rein3d_jax.depth.scale import height_above_floor
+from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.scene import Panorama
 
 _NEAREST, _FARTHEST = 0.5, 30.0  # metres, of the median of a room
+_LOWEST, _HIGHEST = 0.3, 3.5  # metres of a camera above the floor
 _SMALLEST = 1.2  # metres: someone who stands sees their feet farther than that
 _ROWS, _PATCH = 64, 8  # of the map that is looked at, and of a patch of it: 22 degrees
 _SMOOTH = 0.03  # greatest relative deviation (rms) of a patch from a plane that tells something
@@ -25,7 +29,18 @@ def implausible_size(panorama: Panorama) -> str:
         return f"a median of {median:.3g} m: no room is so large"
     if median < _NEAREST or far < _SMALLEST:
         return f"nothing farther than {far:.2g} m: no room is so small"
+    height = _height(panorama)
+    if not _LOWEST < height < _HIGHEST:
+        return f"a floor {height:.2g} m below the camera: no camera stands there"
     return ""
+
+
+def _height(panorama: Panorama) -> float:
+    """Metres of the camera above the floor; someone's eye height where no floor shows."""
+    try:
+        return height_above_floor(panorama)
+    except InputError:
+        return EYE_HEIGHT
 
 
 def flattest_kind(panorama: Panorama, kinds: tuple[str, ...]) -> str:

@@ -7,7 +7,8 @@ import numpy as np
 from experiments.reconstruct.inputs import SAMPLES
 from rein3d_jax.depth.network.config import DepthNetworkConfig
 from rein3d_jax.depth.network.network import estimate_depth
-from rein3d_jax.io.pictures.image import read_rgb, resize_panorama
+from rein3d_jax.io.pictures.image import resize_panorama
+from rein3d_jax.io.pictures.photo import read_rgb
 from rein3d_jax.networks.depth import SHIPPED_DEPTH, read_depth_network
 
 

@@ -75,7 +75,8 @@ def _distance_origin(run: Run) -> str:
     }[run.config.depth.method]
     said = f"{run.distance_origin}. The photograph came without depth, so {how}"
     told = "a guess" if run.config.input.camera_height is None else "as given"
-    return f"{said}, and sizes follow the camera's height above the floor, {run.config.input.eye_height} m ({told})."
+    said = f"{said}, and sizes follow the camera's height above the floor, {run.config.input.eye_height} m ({told})."
+    return f"{said} Of the photograph: {run.converted}." if run.converted else said
 
 
 def _warnings_of_input(run: Run):

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from rein3d_jax.errors import InputError
 
-_NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+_UNKNOWN = {errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EBADF}  # what a file system answers that cannot do it
 
 
 @contextmanager
@@ -27,7 +28,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         yield temporary
         _sync(temporary)
         os.replace(temporary, path)
-        _sync(path.parent)  # the new name itself must survive a power cut
+        _sync_folder(path.parent)  # the new name itself must survive a power cut
     except OSError as error:
         raise InputError(_explain(path, error)) from error
     finally:
@@ -54,7 +55,22 @@ def _sync(path: Path) -> None:
         os.close(descriptor)
 
 
+def _sync_folder(path: Path) -> None:
+    """Where folders can be synced: network shares refuse it, Windows does not even open one. The file is safe."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:
+        return
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in _UNKNOWN:
+            raise
+    finally:
+        os.close(descriptor)
+
+
 def _explain(path: Path, error: OSError) -> str:
     reason = " ".join((error.strerror or str(error)).split())
-    mend = "free some space there" if error.errno in _NO_ROOM else "choose an output path that can be written"
+    mend = "free some space there" if error.errno in NO_ROOM else "choose an output path that can be written"
     return f"{path} cannot be written ({reason}): {mend}"

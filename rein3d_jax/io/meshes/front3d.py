@@ -18,7 +18,8 @@ import numpy as np
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.json_file import path_within, read_json
 from rein3d_jax.io.meshes.mesh_file import read_mesh
-from rein3d_jax.io.pictures.image import read_rgb, to_uint8
+from rein3d_jax.io.pictures.image import to_uint8
+from rein3d_jax.io.pictures.photo import read_rgb
 from rein3d_jax.meshes.mesh_scene import MeshScene, mesh_scene
 from rein3d_jax.meshes.texture import Texture, texture
 from rein3d_jax.meshes.triangles import Triangles, join_triangles, transformed, triangles, z_up

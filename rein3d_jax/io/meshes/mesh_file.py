@@ -12,7 +12,7 @@ from rein3d_jax.geometry.colour import srgb_from_linear
 from rein3d_jax.io.files.input_file import require_file
 from rein3d_jax.io.files.json_file import path_within
 from rein3d_jax.io.meshes.gltf_header import check_gltf
-from rein3d_jax.io.pictures.image import read_rgb
+from rein3d_jax.io.pictures.photo import read_rgb
 from rein3d_jax.meshes.mesh_scene import MeshScene, mesh_scene
 from rein3d_jax.meshes.texture import Texture, texture
 from rein3d_jax.meshes.triangles import MAX_TRIANGLES, Triangles, join_triangles, transformed, triangles, z_up

@@ -10,10 +10,12 @@ import OpenImageIO as oiio
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.input_file import require_file
 
-MAX_COLUMNS = 16384
-_FORMATS = ("jpeg", "png", "openexr", "hdr")  # OpenImageIO reads many more, a made-up ".null" among them
+MAX_COLUMNS = 20000
+# OpenImageIO reads many more, a made-up ".null" among them; "pnm" is PFM, too.
+_FORMATS = ("jpeg", "png", "openexr", "hdr", "tiff", "webp", "bmp", "pnm")
+_BAND = 64  # rows that are reduced at a time
 _CREDIT = 200  # characters of each
-_MEND = f"give a JPEG, PNG, EXR or HDR file of at most {MAX_COLUMNS} columns"
+_MEND = f"give a JPEG, PNG, TIFF, WebP, EXR or HDR file of at most {MAX_COLUMNS} columns"
 
 
 @contextmanager
@@ -27,6 +29,7 @@ def open_image(path: Path) -> Iterator[oiio.ImageInput]:
     oiio.attribute("limits:resolution", MAX_COLUMNS)
     as_stored = oiio.ImageSpec()
     as_stored.attribute("oiio:UnassociatedAlpha", 1)  # colours not multiplied by alpha
+    as_stored.attribute("pnm:pfmflip", 1)  # PFM begins at the bottom
     image = None
     try:
         image = oiio.ImageInput.open(str(path), as_stored)
@@ -52,6 +55,25 @@ def read_pixels(path: Path, image: oiio.ImageInput, kind: str) -> np.ndarray:
     return pixels
 
 
+def read_reduced(path: Path, image: oiio.ImageInput, columns: int) -> np.ndarray:
+    """Pixels (h / k, w / k, channels) as float, each the mean of k x k of the file's, k the least that leaves no more
+    than `columns`; rows and columns left over are left out. Raises InputError as `read_pixels` does."""
+    spec = image.spec()
+    k = -(-spec.width // columns)
+    if k == 1 or spec.tile_width:
+        return read_pixels(path, image, "float")
+    wide, rows = spec.width // k, spec.height // k
+    found = np.empty((rows, wide, spec.nchannels), np.float32)
+    for begin in range(0, rows, _BAND):
+        end = min(begin + _BAND, rows)
+        band = image.read_scanlines(begin * k, end * k, 0, 0, spec.nchannels, "float")
+        if band is None:
+            raise InputError(f"{path} is damaged or cut short ({_first_line(image.geterror())}): export it again")
+        band = band.reshape(end - begin, k, spec.width, -1)[:, :, : wide * k]
+        found[begin:end] = band.reshape(end - begin, k, wide, k, -1).mean(axis=(1, 3))
+    return found
+
+
 def read_credit(path: Path) -> str:
     """Author and licence of the picture as its header has them, in one line; "" where it has none. Raises
     InputError as `open_image` does."""
@@ -65,7 +87,7 @@ def _check_whole_and_upright(path: Path, spec: oiio.ImageSpec) -> None:
     if window != (spec.full_x, spec.full_y, spec.full_width, spec.full_height):
         whole = f"{spec.full_width}x{spec.full_height}"
         raise InputError(f"{path} stores {spec.width}x{spec.height} of a {whole} picture: save it uncropped")
-    if (orientation := spec.get_int_attribute("Orientation", 1)) != 1:
+    if (orientation := spec.get_int_attribute("Orientation", 1)) not in (0, 1):  # 0: some stitchers', for "not said"
         raise InputError(f"{path} is stored rotated (EXIF orientation {orientation}): save it upright")
 
 

@@ -11,30 +11,49 @@ from rein3d_jax.io.files.npy import read_arrays, read_headers
 from rein3d_jax.io.pictures.decode import MAX_COLUMNS, open_image, read_pixels
 from rein3d_jax.io.pictures.exr import write_exr
 
-_METRES_PER_UNIT = 0.001  # 16-bit PNG holds millimetres
+_MILLIMETRE = 0.001  # whole numbers hold millimetres
+_NOWHERE = 1e9  # of any unit: Blender writes 1e10
+_MANY, _SUSPICIOUS = 200, 0.01  # values of a map; share of its pixels that hold the largest one exactly
 _FARTHEST_MEDIAN = 1000.0  # metres; no room is like that, but any room is in millimetres
 _PLANAR = re.compile(r"(?<![a-z])z(?![a-z])|planar|zdepth|depthz|zbuf")
 _BEST_FIRST = ("distance", "depth", "y", "r")
+_MAPS = "give a float EXR, TIFF or PFM, a 16-bit grey PNG in mm, an NPY or an NPZ"
 
 
 def read_distance(
-    path: str | Path, shape: tuple[int, int] | None = None, *, metres: bool = True
+    path: str | Path, shape: tuple[int, int] | None = None, *, metres: bool = True, unit: float | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Distance (h, w) float32 metres along the ray, 0 where unknown, and valid (h, w) bool; without `metres`, numbers
     that mean something else (depth/kinds.py), as they stand in the file.
 
-    EXR (one channel, or one named distance, depth, Y or R), 16-bit PNG (millimetres), NPY, or NPZ (one array, or
-    the key "distance"). 0, negative, NaN and inf mean unknown. Raises InputError, before pixels are allocated
-    where the header tells: missing, damaged, another size than `shape` (h, w) or than 2:1, 8 bits, nothing known; of
-    `metres` a name that says planar z, or a median that looks like millimetres.
+    EXR (one channel, or one named distance, depth, Y or R), float TIFF and PFM, 16-bit PNG or TIFF, NPY, or NPZ (one
+    array, or the key "distance" or "depth"); axes of length 1 do not count. `unit` is the numbers' in metres; None:
+    metres, and millimetres where they are whole. 0, negative, NaN, inf, what is beyond any room, and the largest
+    number, where suspiciously many pixels hold exactly that, mean unknown. Raises InputError, before pixels are
+    allocated where the header tells: missing, damaged, another size than `shape` (h, w) or than 2:1, 8 bits, nothing
+    known; of `metres` a name that says planar z, or a median that looks like millimetres.
     """
     path = Path(path)
     read = _read_numpy if path.suffix.lower() in (".npy", ".npz") else _read_image
+    numbers = read(path, shape, metres)
+    unknown = _beyond(numbers)
+    scale = unit or (_MILLIMETRE if numbers.dtype.kind in "ui" and metres else 1.0)
     with np.errstate(over="ignore"):  # float64 beyond float32 becomes inf: unknown
-        distance = read(path, shape, metres).astype(np.float32)
-    valid = np.isfinite(distance) & (distance > 0)
+        distance = (numbers * scale).astype(np.float32)
+    valid = np.isfinite(distance) & (distance > 0) & ~unknown
     _check_known(path, distance[valid], metres)
     return np.where(valid, distance, np.float32(0)), valid
+
+
+def _beyond(numbers: np.ndarray) -> np.ndarray:
+    """Where numbers stand for "nothing there": what only a code or a far clip can be."""
+    whole = numbers.dtype.kind in "ui"
+    beyond = numbers == np.iinfo(numbers.dtype).max if whole else numbers.astype(np.float64) > _NOWHERE
+    values, counts = np.unique(numbers[np.isfinite(numbers) & ~beyond & (numbers > 0)], return_counts=True)
+    # A map has thousands of values, and its farthest stands in a corner: of a clipped one it stands everywhere.
+    if values.size > _MANY and counts[-1] > max(_SUSPICIOUS * counts.sum(), 10 * np.median(counts)):
+        beyond |= numbers == values[-1]
+    return beyond
 
 
 def write_distance_exr(path: str | Path, distance: np.ndarray) -> None:
@@ -63,31 +82,37 @@ def _check_size(path: Path, found: tuple[int, ...], shape: tuple[int, int] | Non
 
 
 def _check_name(path: Path, name: str, metres: bool) -> None:
-    if metres and _PLANAR.search(name.lower()):
+    # A panoramic camera's Depth.Z in Blender is along the ray; whether it is shows in its surfaces (given_distance).
+    if metres and not name.endswith("Depth.Z") and _PLANAR.search(name.lower()):
         mend = "set input.distance_kind = z if it is that of cube faces; if it is along the ray, name it distance"
         raise InputError(f"{path} holds {name!r}, which says planar z, not distance: {mend}")
 
 
 def _read_numpy(path: Path, shape: tuple[int, int] | None, metres: bool) -> np.ndarray:
     headers = read_headers(path)
-    name = "distance" if "distance" in headers else next(iter(headers), "")
-    if len(headers) != 1 and name != "distance":
+    name = next((name for name in ("distance", "depth") if name in headers), next(iter(headers), ""))
+    if len(headers) != 1 and name not in ("distance", "depth"):
         raise InputError(f"{path} holds the arrays {', '.join(headers) or '(none)'}: name the one to use distance")
     _check_name(path, name, metres)
-    _check_size(path, headers[name].shape, shape)
-    if headers[name].dtype.kind != "f":
+    found = tuple(size for size in headers[name].shape if size != 1)
+    _check_size(path, found, shape)
+    if headers[name].dtype.kind not in "fui" or headers[name].dtype.itemsize == 1:
         raise InputError(f"{path} holds {headers[name].dtype} values: save the distance as float metres")
-    return read_arrays(path, [name])[0]
+    return read_arrays(path, [name])[0].reshape(found)
 
 
 def _read_image(path: Path, shape: tuple[int, int] | None, metres: bool) -> np.ndarray:
     with open_image(path) as image:
         spec = image.spec()
         _check_size(path, (spec.height, spec.width), shape)
-        if image.format_name() == "png" and spec.format == oiio.UINT16 and spec.nchannels == 1:
-            return read_pixels(path, image, "uint16")[..., 0] * _METRES_PER_UNIT
-        if image.format_name() != "openexr" or spec.format not in (oiio.HALF, oiio.FLOAT):
-            raise InputError(f"{path} is no distance map: give a float EXR, a 16-bit grey PNG in mm, an NPY or an NPZ")
+        kind = image.format_name()
+        if kind in ("png", "tiff") and spec.format == oiio.UINT16 and spec.nchannels in (1, 3):
+            pixels = read_pixels(path, image, "uint16")
+            if not (pixels == pixels[..., :1]).all():
+                raise InputError(f"{path} is a colour picture: give distance in one channel")
+            return pixels[..., 0]
+        if kind not in ("openexr", "tiff", "pnm") or spec.format not in (oiio.HALF, oiio.FLOAT):
+            raise InputError(f"{path} is no distance map: {_MAPS}")
         channel = _distance_channel(path, spec.channelnames, metres)
         pixels = read_pixels(path, image, "float")
     distance = pixels[..., spec.channelnames.index(channel)]

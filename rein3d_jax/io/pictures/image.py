@@ -1,4 +1,4 @@
-"""Panoramas as pictures: read, resized, encoded, written. sRGB in [0, 1], (h, w, 3)."""
+"""Pictures as sRGB in [0, 1], (h, w, 3): resized, encoded, written."""
 
 from pathlib import Path
 
@@ -7,36 +7,6 @@ import numpy as np
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_bytes
-from rein3d_jax.io.pictures.decode import open_image, read_pixels
-from rein3d_jax.io.pictures.tone import tone_map
-
-MIN_ROWS = 16
-_LINEAR = ("openexr", "hdr")  # formats that hold linear light
-
-
-def read_rgb(path: str | Path, *, panorama: bool = True) -> np.ndarray:
-    """Equirectangular picture as float32 sRGB (h, 2 h, 3) in [0, 1]; with `panorama` False, one of any aspect.
-
-    JPEG and PNG (8 or 16 bits, grey spread to three channels, alpha dropped) are taken as sRGB; EXR and HDR as
-    linear light, which is exposed and tone-mapped (tone.py). Raises InputError, before pixels are allocated
-    where the header tells: missing, no picture, damaged, not 2:1, under MIN_ROWS rows, over MAX_COLUMNS columns.
-    """
-    path = Path(path)
-    with open_image(path) as image:
-        spec = image.spec()
-        if panorama:
-            _check_panorama(path, spec.width, spec.height)
-        channels = _colour_channels(path, [name.upper() for name in spec.channelnames])
-        pixels = read_pixels(path, image, "float")[..., channels]
-        return tone_map(pixels) if image.format_name() in _LINEAR else pixels
-
-
-def panorama_rows(path: str | Path) -> int:
-    """The rows of the equirectangular picture in a file, by its header. Raises InputError as `read_rgb` does."""
-    with open_image(Path(path)) as image:
-        spec = image.spec()
-        _check_panorama(Path(path), spec.width, spec.height)
-        return spec.height
 
 
 def resize_panorama(
@@ -89,22 +59,6 @@ def write_rgb(path: str | Path, rgb: np.ndarray) -> None:
     if encode is None:
         raise InputError(f"{path} has no picture format known by its suffix: end it in .png or .jpg")
     write_bytes(path, encode(rgb))
-
-
-def _check_panorama(path: Path, width: int, height: int) -> None:
-    if width != 2 * height:
-        mend = "a panorama must be twice as wide as high: crop or pad it to 2:1"
-        raise InputError(f"{path} is {width}x{height}; {mend}")
-    if height < MIN_ROWS:
-        raise InputError(f"{path} is {width}x{height}; a panorama needs {MIN_ROWS} rows or more: give a larger one")
-
-
-def _colour_channels(path: Path, names: list[str]) -> list[int]:
-    if {"R", "G", "B"} <= set(names):
-        return [names.index(name) for name in "RGB"]
-    if names[0] == "Y" and "RY" not in names:
-        return [0, 0, 0]
-    raise InputError(f"{path} has the channels {', '.join(names)}: save it as grey or with channels R, G and B")
 
 
 def _encode(suffix: str, rgb: np.ndarray, options: list[int]) -> bytes:

@@ -20,7 +20,7 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.json_file import path_within, read_json
 from rein3d_jax.io.pictures.decode import open_image
 from rein3d_jax.io.pictures.distance import read_distance
-from rein3d_jax.io.pictures.image import read_rgb
+from rein3d_jax.io.pictures.photo import read_rgb
 from rein3d_jax.io.rooms.posed_panorama import PosedPanorama, panorama_pose, rigid_pose
 from rein3d_jax.scene import Camera, Panorama
 

@@ -13,8 +13,8 @@ import numpy as np
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.spherical_harmonics import C0, sh_from_rgb
 from rein3d_jax.io.files.atomic import write_bytes
-from rein3d_jax.io.files.input_file import require_file
 from rein3d_jax.io.splats.gaussian_columns import REST_COUNTS, Columns, alive_columns, from_columns
+from rein3d_jax.io.splats.ply_table import header_lines
 from rein3d_jax.io.splats.quantise import alpha_bytes, alpha_logits, from_levels, to_levels, with_largest
 from rein3d_jax.scene import Gaussians
 
@@ -23,7 +23,6 @@ _BOUNDS = [f"{end}_{name}" for stem in ("{}", "scale_{}") for end in ("min", "ma
 _COLOUR_BOUNDS = [f"{end}_{channel}" for end in ("min", "max") for channel in "rgb"]
 _PACKED = ["packed_position", "packed_rotation", "packed_scale", "packed_color"]
 _SCALE_LIMIT = 20.0  # log scales beyond are clipped, as SuperSplat does
-_HEADER_LIMIT = 65536  # bytes; a degree-3 header takes 2000
 
 
 def write_compressed_ply(path: str | Path, gaussians: Gaussians) -> None:
@@ -45,17 +44,13 @@ def write_compressed_ply(path: str | Path, gaussians: Gaussians) -> None:
 
 def is_compressed_ply(path: str | Path) -> bool:
     """Whether a PLY's header speaks of packed positions. Raises InputError if the file cannot be read."""
-    require_file(Path(path))
-    with open(path, "rb") as file:
-        head, _, _ = file.read(_HEADER_LIMIT).partition(b"end_header\n")
-    return b"packed_position" in head
+    return any(words[-1] == "packed_position" for words in header_lines(Path(path))[0])
 
 
 def read_compressed_ply(path: str | Path) -> Gaussians:
     """The scene in a compressed PLY, every slot alive. Raises InputError, before allocation, if the header is another
     format's or the file is not as long as it declares; and if a value is not finite."""
     path = Path(path)
-    require_file(path)
     coloured, rest, count, start = _read_layout(path)
     per_chunk = 18 if coloured else 12
     chunks = -(-count // _CHUNK)
@@ -93,15 +88,13 @@ def _header(chunks: int, count: int, rest: int) -> str:
 
 def _read_layout(path: Path) -> tuple[bool, int, int, int]:
     """Whether chunks bound colours, f_rest properties, count, and where the data starts, checked against the size."""
-    with open(path, "rb") as file:
-        head, mark, _ = file.read(_HEADER_LIMIT).partition(b"end_header\n")
-    text = "\n".join(line for line in head.decode("ascii", "replace").splitlines() if not line.startswith("comment"))
-    found = [int(line.split()[-1]) for line in text.splitlines() if _is_count(line.split())]
+    lines, start = header_lines(path)
+    text, size = "\n".join(map(" ".join, lines)), path.stat().st_size
+    found = [int(words[-1]) for words in lines if _is_count(words)]
     chunks, count = (*found, 0, 0)[:2]
-    start, size = len(head) + len(mark), path.stat().st_size
     for coloured in (True, False):
         for rest in REST_COUNTS:
-            if not mark or text + "\nend_header\n" != _known_header(chunks, count, 3 * rest, coloured):
+            if text + "\nend_header\n" != _known_header(chunks, count, 3 * rest, coloured):
                 continue
             needed = start + 4 * chunks * (18 if coloured else 12) + count * (16 + 3 * rest)
             if chunks != -(-count // _CHUNK) or needed > size:

@@ -24,10 +24,15 @@ _FORMATS: dict[str, tuple[Callable[..., Gaussians], Callable[..., None]]] = {
     ".splat": (read_splat, write_splat),
 }
 
+_OTHERS = (".ksplat", ".sog", ".lcc")  # what a converter makes a .ply of
+
 
 def read_splats(path: str | Path) -> Gaussians:
     """The scene in `path`, every slot alive, in the axes of ply.py. Raises InputError for a suffix that is none of
     these, and for what the format's reader refuses."""
+    if (suffix := Path(path).suffix.lower()) in _OTHERS:
+        mend = "convert it to .ply, with `npx @playcanvas/splat-transform` or superspl.at/editor"
+        raise InputError(f"{path} is a {suffix} scene, which is not read here: {mend}")
     return _format(path)[0](path)
 
 

@@ -3,21 +3,22 @@
 x y z  nx ny nz (0)  f_dc_0..2  f_rest_0..(3k - 1), channel-major  opacity (logit)  scale_0..2 (log)  rot_0..3 (wxyz)
 """
 
+import math
+import warnings
 from pathlib import Path
 
 import numpy as np
 
 from rein3d_jax.errors import InputError
+from rein3d_jax.geometry.spherical_harmonics import sh_from_rgb
 from rein3d_jax.io.files.atomic import atomic_path
-from rein3d_jax.io.files.input_file import require_file
 from rein3d_jax.io.splats.gaussian_columns import REST_COUNTS, Columns, from_columns, require_finite
+from rein3d_jax.io.splats.ply_table import find_vertices, read_columns
 from rein3d_jax.scene import Gaussians
 
 _NORMALS = ["nx", "ny", "nz"]  # always 0: viewers expect the columns, nobody reads them
 _ANTIALIASED = "comment antialiased (Mip-Splatting, eq. 9)"
-_HEADER_LIMIT = 65536  # bytes; a degree-3 header takes 1500
-_TYPES = dict(char="i1", uchar="u1", short="i2", ushort="u2", int="i4", uint="u4", float="f4", double="f8")
-_TYPES |= dict(int8="i1", uint8="u1", int16="i2", uint16="u2", int32="i4", uint32="u4", float32="f4", float64="f8")
+_RGB = ["red", "green", "blue"]  # bytes: what nerfstudio writes for f_dc with --ply-color-mode rgb
 
 
 def write_ply(path: str | Path, gaussians: Gaussians, *, antialias: bool = False) -> None:
@@ -26,7 +27,7 @@ def write_ply(path: str | Path, gaussians: Gaussians, *, antialias: bool = False
     splats too dense. Raises InputError, and writes nothing, if any value is not finite."""
     table = _table(gaussians)
     require_finite(path, table)
-    names = _property_names(table.shape[1] - 17)
+    names = _property_names(_numbered("f_dc", 3), _numbered("f_rest", table.shape[1] - 17))
     names[3:3] = _NORMALS
     lines = ["ply", "format binary_little_endian 1.0", *[_ANTIALIASED] * antialias, f"element vertex {len(table)}"]
     lines += [f"property float {name}" for name in names] + ["end_header", ""]
@@ -36,30 +37,49 @@ def write_ply(path: str | Path, gaussians: Gaussians, *, antialias: bool = False
 
 
 def read_ply(path: str | Path) -> Gaussians:
-    """The scene in a binary little-endian 3DGS PLY, every slot alive, quaternions made unit. Properties may come
-    in any order, others are skipped. Raises InputError, before allocation, if a property is missing or the file
-    is shorter than it declares; and if a value is not finite or a quaternion has no direction."""
+    """The scene in a 3DGS PLY, binary or ASCII, every slot alive, quaternions made unit. Properties may come in any
+    order, others are skipped; degrees above 3 are left out, with a warning. Raises InputError, before allocation, if a
+    property is missing or the file is shorter than it declares; and as from_columns does."""
     path = Path(path)
-    count, vertex, start = _read_layout(path)
-    rest = _rest_count(path, vertex)
-    names = _property_names(rest)
-    if missing := [name for name in names if name not in vertex.names]:
+    vertices = find_vertices(path)
+    held = vertices.row.names
+    dc, rest = _dc_names(vertices.row), _rest_names(path, held)
+    names = _property_names(dc, rest)
+    if missing := [name for name in names if name not in held]:
         raise InputError(f"{path} lacks the properties {', '.join(missing)}: export it as a 3DGS PLY")
-    vertices = np.fromfile(path, vertex, count, offset=start)
-    table = np.stack([vertices[name] for name in names], axis=1, dtype=np.float32, casting="same_kind")
-    means, dc, higher, opacity, log_scales, quats = np.split(table, np.cumsum([3, 3, rest, 1, 3]), axis=1)
-    sh = np.concatenate([dc[:, None], higher.reshape(count, 3, rest // 3).swapaxes(1, 2)], axis=1)
+    table = read_columns(path, vertices, names)
+    means, colour, higher, opacity, log_scales, quats = np.split(table, np.cumsum([3, 3, len(rest), 1, 3]), axis=1)
+    colour = sh_from_rgb(colour / 255) if dc == _RGB else colour
+    higher = higher.reshape(len(table), 3, len(rest) // 3).swapaxes(1, 2)
+    sh = np.concatenate([colour[:, None], higher], axis=1)
     return from_columns(Columns(means, log_scales, quats, opacity[:, 0], sh), path)
 
 
-def _property_names(rest: int) -> list[str]:
+def _property_names(dc: list[str], rest: list[str]) -> list[str]:
     """All but the normals, in the file's order."""
+    return [*"xyz", *dc, *rest, "opacity", *_numbered("scale", 3), *_numbered("rot", 4)]
 
-    def numbered(stem: str, count: int) -> list[str]:
-        return [f"{stem}_{i}" for i in range(count)]
 
-    colour = numbered("f_dc", 3) + numbered("f_rest", rest)
-    return [*"xyz", *colour, "opacity", *numbered("scale", 3), *numbered("rot", 4)]
+def _numbered(stem: str, count: int) -> list[str]:
+    return [f"{stem}_{i}" for i in range(count)]
+
+
+def _dc_names(row: np.dtype) -> list[str]:
+    dc = _numbered("f_dc", 3)
+    in_bytes = all(name in row.names and row[name] == np.uint8 for name in _RGB)
+    return _RGB if in_bytes and not set(dc) & set(row.names) else dc
+
+
+def _rest_names(path: Path, held: tuple[str, ...]) -> list[str]:
+    """Of each channel's f_rest properties those up to degree 3."""
+    count = sum(name.startswith("f_rest_") for name in held)
+    per_channel, degree = count // 3, math.isqrt(count // 3 + 1) - 1
+    if count != 3 * ((degree + 1) ** 2 - 1):
+        raise InputError(f"{path} has {count} f_rest properties: export it with SH degree 0 to 3 (0, 9, 24 or 45)")
+    if degree >= len(REST_COUNTS):
+        warnings.warn(f"{path} has SH degree {degree}, of which degrees 0 to 3 are read", stacklevel=3)
+    kept = min(per_channel, REST_COUNTS[-1])
+    return [f"f_rest_{channel * per_channel + i}" for channel in range(3) for i in range(kept)]
 
 
 def _table(gaussians: Gaussians) -> np.ndarray:
@@ -70,40 +90,3 @@ def _table(gaussians: Gaussians) -> np.ndarray:
     rest = sh[:, 1:].swapaxes(1, 2).reshape(len(sh), 3 * (sh.shape[1] - 1))
     columns = [means, np.zeros_like(means), sh[:, 0], rest, opacity[:, None], scales, quats]
     return np.concatenate(columns, axis=1, dtype="<f4")
-
-
-def _read_layout(path: Path) -> tuple[int, np.dtype, int]:
-    """Vertex count, vertex layout and the byte where vertices start, checked against the file's size."""
-    require_file(path)
-    with open(path, "rb") as file:
-        head, mark, _ = file.read(_HEADER_LIMIT).partition(b"end_header\n")
-    count, vertex = _parse_header(path, head if mark else b"")
-    start, size = len(head) + len(mark), path.stat().st_size
-    if start + count * vertex.itemsize > size:
-        held = (size - start) // vertex.itemsize
-        raise InputError(f"{path} declares {count} vertices but holds {held}: it is cut short, copy it again")
-    return count, vertex, start
-
-
-def _rest_count(path: Path, vertex: np.dtype) -> int:
-    count = sum(name.startswith("f_rest_") for name in vertex.names)
-    if count not in [3 * rest for rest in REST_COUNTS]:
-        raise InputError(f"{path} has {count} f_rest properties: export it with SH degree 0 to 3 (0, 9, 24 or 45)")
-    return count
-
-
-def _parse_header(path: Path, head: bytes) -> tuple[int, np.dtype]:
-    """Vertex count and layout. The vertices must come first; what follows them is not read."""
-    lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
-    lines = [words for words in lines if words and words[0] not in ("comment", "obj_info")]
-    if lines[:2] != [["ply"], ["format", "binary_little_endian", "1.0"]]:
-        raise InputError(f"{path} is not a binary little-endian PLY: export it as one")
-    elements = [i for i, words in enumerate(lines) if words[0] == "element"]
-    try:
-        _, name, count = lines[elements[0]]
-        body = lines[elements[0] + 1 : [*elements, len(lines)][1]]
-        if name != "vertex" or int(count) < 0:
-            raise ValueError(f"the first element is {name} {count}")
-        return int(count), np.dtype([(name, "<" + _TYPES[kind]) for _, kind, name in body])
-    except (ValueError, KeyError, IndexError) as error:
-        raise InputError(f"{path} has a PLY header that is no scene's ({error}): export it as a 3DGS PLY") from error

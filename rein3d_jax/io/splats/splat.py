@@ -14,12 +14,12 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.spherical_harmonics import C0, sh_from_rgb
 from rein3d_jax.io.files.atomic import write_bytes
 from rein3d_jax.io.files.input_file import require_file
-from rein3d_jax.io.splats.gaussian_columns import Columns, alive_columns, from_columns
+from rein3d_jax.io.splats.gaussian_columns import FLATTEST, Columns, alive_columns, from_columns
 from rein3d_jax.io.splats.quantise import alpha_bytes, alpha_logits, from_levels, to_levels
 from rein3d_jax.scene import Gaussians
 
 _SPLAT = np.dtype([("means", "<f4", 3), ("scales", "<f4", 3), ("rgb", "u1", 3), ("alpha", "u1"), ("quats", "u1", 4)])
-_LOG_SCALES = (-16.0, 80.0)  # log metres; a splat flatter than 0.1 micrometres is as flat, even with a scale of 0
+_LOG_SCALES = (FLATTEST, 80.0)  # log metres
 
 
 def write_splat(path: str | Path, gaussians: Gaussians) -> None:
@@ -35,8 +35,7 @@ def write_splat(path: str | Path, gaussians: Gaussians) -> None:
 
 def read_splat(path: str | Path) -> Gaussians:
     """The scene in a .splat file, degree 0, every slot alive. Raises InputError if it is missing, no whole number of
-    Gaussians long, or if it holds a value that is not finite, a scale below 0, or a quaternion
-    without a direction."""
+    Gaussians long, or if it holds a scale below 0; and as from_columns does."""
     path = Path(path)
     require_file(path)
     if (size := path.stat().st_size) % _SPLAT.itemsize:
@@ -47,6 +46,6 @@ def read_splat(path: str | Path) -> Gaussians:
         raise InputError(f"{path} has {bad} scales below 0: it is damaged or no .splat file, export it again")
     quats = (table["quats"].astype(np.float32) - 128) / 128
     sh = sh_from_rgb(from_levels(table["rgb"], 8)).astype(np.float32)[:, None]
-    log_scales = np.log(np.maximum(scales, np.exp(np.float32(_LOG_SCALES[0]))))
+    log_scales = np.log(np.maximum(scales, np.exp(np.float32(FLATTEST))))
     means = np.ascontiguousarray(table["means"])
     return from_columns(Columns(means, log_scales, quats, alpha_logits(table["alpha"]), sh), path)

@@ -1,5 +1,5 @@
 """Scenes as SPZ (github.com/nianticlabs/spz): a gzip stream of a 16-byte header and quantised columns, about 16 bytes
-a Gaussian. Version 2 is written, 2 and 3 are read.
+a Gaussian. Version 2 is written, 1 to 3 are read: 1 has positions in half floats. Version 4 is of zstd streams.
 
 positions (24-bit fixed point)  opacity (u8)  colour (u8)  log scales (u8, 1/16)  rotation (u8 xyz)  SH (5 and 4 bits)
 
@@ -26,7 +26,8 @@ _MAX_GAUSSIANS = 10_000_000  # the reference library reads no more
 _HEADER = struct.Struct("<4sIIBBBB")  # magic, version, count, SH degree, fractional bits, flags, reserved
 _FRACTIONAL_BITS = 12  # of the 24: 0.24 mm, and 2 km to either side
 _COLOUR_SCALE = 0.15  # 0.5 + 0.15 f_dc fills the byte
-_ROTATION_BYTES = {2: 3, 3: 4}
+_POSITION_BYTES = {1: 6, 2: 9, 3: 9}
+_ROTATION_BYTES = {1: 3, 2: 3, 3: 4}
 _DEFLATE_RATIO = 1032  # a deflate stream holds no more bytes for each of its own
 _FLIP = np.array([1, -1, -1], np.float32)  # y and z
 # The sign of each SH basis function above degree 0 when y and z change theirs.
@@ -60,21 +61,22 @@ def write_spz(path: str | Path, gaussians: Gaussians, *, antialias: bool = False
 
 
 def read_spz(path: str | Path) -> Gaussians:
-    """The scene in an SPZ file of version 2 or 3, every slot alive. Raises InputError if it is missing, damaged, of
+    """The scene in an SPZ file of version 1 to 3, every slot alive. Raises InputError if it is missing, damaged, of
     another version, over _MAX_GAUSSIANS, or not exactly as long as it declares, before more than that is unpacked."""
     path = Path(path)
     require_file(path)
     version, count, degree, bits, data = _unpack(path)
     rest = REST_COUNTS[degree]
-    widths = [9, 1, 3, 3, _ROTATION_BYTES[version], 3 * rest]
+    widths = [_POSITION_BYTES[version], 1, 3, 3, _ROTATION_BYTES[version], 3 * rest]
     ends = np.cumsum([count * width for width in widths])[:-1]
     blocks = np.split(np.frombuffer(data, np.uint8), ends)
     means, alpha, colour, scales, rotation, sh = (b.reshape(count, w) for b, w in zip(blocks, widths, strict=True))
     dc = ((colour / 255 - 0.5) / _COLOUR_SCALE)[:, None]
     sh = (sh.reshape(count, rest, 3) / 128 - 1) * _FLIP_REST[:rest]
-    quats = (_quats_from_xyz if version == 2 else _quats_from_smallest_three)(rotation) * [1, *_FLIP]
+    quats = (_quats_from_smallest_three if version == 3 else _quats_from_xyz)(rotation) * [1, *_FLIP]
     log_scales = scales / np.float32(16) - 10
-    fields = (_fixed(means) / 2.0**bits * _FLIP, log_scales, quats, alpha_logits(alpha[:, 0]), np.hstack([dc, sh]))
+    metres = _halves(means) if version == 1 else _fixed(means) / 2.0**bits
+    fields = (metres * _FLIP, log_scales, quats, alpha_logits(alpha[:, 0]), np.hstack([dc, sh]))
     return from_columns(Columns(*(field.astype(np.float32) for field in fields)), path)
 
 
@@ -109,6 +111,8 @@ def _rest_bytes(rest: np.ndarray) -> np.ndarray:
 def _unpack(path: Path) -> tuple[int, int, int, int, bytes]:
     """Version, count, degree, fractional bits and the columns' bytes. Every size is checked before it is unpacked."""
     packed = path.read_bytes()
+    if packed[:4] == b"NGSP" and len(packed) > _HEADER.size:
+        raise _bare(path, int.from_bytes(packed[4:8], "little"))
     stream = zlib.decompressobj(wbits=31)  # one gzip member
     try:
         header = stream.decompress(packed, _HEADER.size)
@@ -127,13 +131,30 @@ def _layout(path: Path, header: bytes, packed: int) -> tuple[int, int, int, int,
         raise InputError(f"{path} does not begin like an SPZ file: copy or export it again")
     _, version, count, degree, bits, _, _ = _HEADER.unpack(header)
     if version not in _ROTATION_BYTES:
-        raise InputError(f"{path} is SPZ version {version}: export it as version 2 or 3, or as PLY")
+        raise _other_version(path, version)
     if degree >= len(REST_COUNTS) or bits > 23:
         raise InputError(f"{path} declares SH degree {degree} and {bits} fractional bits: export it with degree 0 to 3")
-    size = count * (16 + _ROTATION_BYTES[version] + 3 * REST_COUNTS[degree])
+    size = count * (7 + _POSITION_BYTES[version] + _ROTATION_BYTES[version] + 3 * REST_COUNTS[degree])
     if count > _MAX_GAUSSIANS or size > _DEFLATE_RATIO * packed:
         raise InputError(f"{path} declares {count} Gaussians in {packed} bytes: it is damaged, copy or export it again")
     return version, count, degree, bits, size
+
+
+def _other_version(path: Path, version: int) -> InputError:
+    mend = "export it as version 2 or 3, or convert it to .ply with `npx @playcanvas/splat-transform`"
+    return InputError(f"{path} is SPZ version {version}, of which 1 to 3 are read: {mend}")
+
+
+def _bare(path: Path, version: int) -> InputError:
+    """A header that is not compressed, as since version 4."""
+    if version not in _ROTATION_BYTES:
+        return _other_version(path, version)
+    return InputError(f"{path} is SPZ version {version}, unpacked: pack it with gzip, under the same name")
+
+
+def _halves(means: np.ndarray) -> np.ndarray:
+    """(n, 6) bytes -> (n, 3) metres."""
+    return np.ascontiguousarray(means).view("<f2").astype(np.float32)
 
 
 def _fixed(means: np.ndarray) -> np.ndarray:
@@ -143,7 +164,7 @@ def _fixed(means: np.ndarray) -> np.ndarray:
 
 
 def _quats_from_xyz(rotation: np.ndarray) -> np.ndarray:
-    """Version 2: x y z as bytes (n, 3); w is what a unit quaternion lacks -> wxyz (n, 4)."""
+    """Versions 1 and 2: x y z as bytes (n, 3); w is what a unit quaternion lacks -> wxyz (n, 4)."""
     xyz = rotation / 127.5 - 1
     w = np.sqrt(np.maximum(0, 1 - (xyz**2).sum(axis=1, keepdims=True)))
     return np.hstack([w, xyz])

@@ -13,7 +13,8 @@ from rein3d_jax.geometry.rotations import matrix_from_quats, normalize_quats
 from rein3d_jax.geometry.shell import RoomShell, meet_shell
 from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.io.pictures.distance import read_distance, write_distance_exr
-from rein3d_jax.io.pictures.image import read_rgb, write_rgb
+from rein3d_jax.io.pictures.image import write_rgb
+from rein3d_jax.io.pictures.photo import read_rgb
 
 QUICK = ["depth.method=shell", "shell.climbers=32", "shell.rounds=4"]  # any box will do
 

@@ -17,7 +17,7 @@ from rein3d_jax.geometry.signed_distance import blank_field, fuse
 from rein3d_jax.geometry.sphere import rays_of_pose64
 from rein3d_jax.io.meshes.surface_mesh import extract_surface, without_islands, write_glb
 from rein3d_jax.io.pictures.distance import read_distance
-from rein3d_jax.io.pictures.image import read_rgb
+from rein3d_jax.io.pictures.photo import read_rgb
 from rein3d_jax.io.splats.gaussian_file import read_splats
 
 VOXEL = 0.06

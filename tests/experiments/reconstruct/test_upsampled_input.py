@@ -6,7 +6,7 @@ import pytest
 from experiments.reconstruct.inputs import InputConfig, input_panorama
 from rein3d_jax.geometry.pyramid import blocks
 from rein3d_jax.io.pictures.distance import read_distance
-from rein3d_jax.io.pictures.image import read_rgb
+from rein3d_jax.io.pictures.photo import read_rgb
 
 
 @pytest.mark.parametrize(

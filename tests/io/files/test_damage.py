@@ -10,7 +10,8 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.checkpoint import load, save
 from rein3d_jax.io.files.npy import read_headers
 from rein3d_jax.io.pictures.distance import read_distance, write_distance_exr
-from rein3d_jax.io.pictures.image import encode_jpeg, encode_png, read_rgb
+from rein3d_jax.io.pictures.image import encode_jpeg, encode_png
+from rein3d_jax.io.pictures.photo import read_rgb
 from rein3d_jax.io.splats.ply import read_ply, write_ply
 from rein3d_jax.scene import Gaussians
 

@@ -99,7 +99,7 @@ def test_millimetres_are_refused(tmp_path):
     refused(tmp_path / "x.npy", "looks like millimetres; divide it by 1000")
 
 
-@pytest.mark.parametrize("name", ["Z", "depth_z", "planar", "ViewLayer.Depth.Z", "zdepth"])
+@pytest.mark.parametrize("name", ["Z", "depth_z", "planar", "zdepth"])
 def test_planar_z_is_never_taken_silently(tmp_path, name):
     write_exr(tmp_path / "x.exr", {name: DISTANCE})
     np.savez(tmp_path / "x.npz", **{name: DISTANCE})
@@ -129,13 +129,14 @@ def test_wrong_size_names_both(tmp_path):
 
 def test_wrong_kinds(tmp_path):
     cv2.imwrite(str(tmp_path / "8.png"), np.ones(SHAPE, np.uint8))
-    cv2.imwrite(str(tmp_path / "rgb16.png"), np.ones((*SHAPE, 3), np.uint16))
     cv2.imwrite(str(tmp_path / "x.jpg"), np.ones(SHAPE, np.uint8))
     write_exr(tmp_path / "ids.exr", {"Y": DISTANCE.astype(np.uint32)}, "uint")
-    for name in ("8.png", "rgb16.png", "x.jpg", "ids.exr"):
-        refused(tmp_path / name, "no distance map: give a float EXR, a 16-bit grey PNG")
-    np.save(tmp_path / "int.npy", np.ones(SHAPE, np.int32))
-    refused(tmp_path / "int.npy", "holds int32 values: save the distance as float metres")
+    for name in ("8.png", "x.jpg", "ids.exr"):
+        refused(tmp_path / name, "no distance map: give a float EXR, TIFF or PFM, a 16-bit grey PNG")
+    cv2.imwrite(str(tmp_path / "rgb16.png"), np.arange(3 * 16 * 32).reshape(16, 32, 3).astype(np.uint16))
+    refused(tmp_path / "rgb16.png", "is a colour picture")
+    np.save(tmp_path / "bool.npy", np.ones(SHAPE, bool))
+    refused(tmp_path / "bool.npy", "holds bool values: save the distance as float metres")
 
 
 def test_missing_damaged_and_pickled(tmp_path):
@@ -169,7 +170,7 @@ def test_40000_columns_are_refused(tmp_path):
     data = path.read_bytes().replace(small, wide)
     for padding in (0, 30_000_000):  # with it the file is large enough to be believed
         path.write_bytes(data + bytes(padding))
-        refused(path, "40000x20000.*at most 16384 columns", shape=(20000, 40000))
+        refused(path, "40000x20000.*at most 20000 columns", shape=(20000, 40000))
 
 
 def test_disk_full_keeps_the_earlier_file(tmp_path, file_size_limit):

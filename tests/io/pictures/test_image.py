@@ -10,14 +10,8 @@ import OpenImageIO as oiio
 import pytest
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.pictures.image import (
-    encode_jpeg,
-    encode_png,
-    read_rgb,
-    resize_panorama,
-    to_uint8,
-    write_rgb,
-)
+from rein3d_jax.io.pictures.image import encode_jpeg, encode_png, resize_panorama, to_uint8, write_rgb
+from rein3d_jax.io.pictures.photo import read_rgb
 
 RNG = np.random.default_rng(0)
 RGB = (RNG.integers(0, 256, (16, 32, 3)) / 255).astype(np.float32)
@@ -85,9 +79,10 @@ def test_grey_alpha_and_16_bits(tmp_path):
     np.testing.assert_allclose(read_rgb(tmp_path / "grey16.png"), expected, atol=EXACT)
     cv2.imwrite(str(tmp_path / "grey.jpg"), np.full((16, 32), 100, np.uint8))
     np.testing.assert_allclose(read_rgb(tmp_path / "grey.jpg"), 100 / 255, atol=EXACT)
-    rgba = RNG.integers(0, 256, (16, 32, 4)).astype(np.uint8)  # colours are as stored, whatever alpha is
+    rgba = RNG.integers(0, 256, (16, 32, 4)).astype(np.uint8)  # colours are as stored, where they are there to be seen
     cv2.imwrite(str(tmp_path / "rgba.png"), rgba)
-    np.testing.assert_allclose(read_rgb(tmp_path / "rgba.png"), rgba[..., 2::-1] / 255, atol=EXACT)
+    opaque = (rgba[..., 3:] >= 128) * rgba[..., 2::-1]
+    np.testing.assert_allclose(read_rgb(tmp_path / "rgba.png"), opaque / 255, atol=EXACT)
 
 
 @pytest.mark.parametrize("suffix", [".exr", ".hdr"])
@@ -110,7 +105,7 @@ def test_exr_with_wild_values_and_alpha_is_finite(tmp_path):
 @pytest.mark.parametrize(
     ("width", "height", "message"),
     [
-        (1000, 600, "1000x600; a panorama must be twice as wide as high: crop or pad"),
+        (1000, 600, "1000x600, not 2:1; a panorama must be twice as wide as high"),
         (2, 1, "2x1; .* 16 rows"),
         (1, 2, "1x2"),
     ],
@@ -126,7 +121,7 @@ def test_wrong_sizes_are_refused_by_name(tmp_path, width, height, message):
 def test_40000_columns_are_refused_before_allocation(tmp_path, name, padding):
     (tmp_path / name).write_bytes(WIDE[name] + bytes(padding))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    with pytest.raises(InputError, match=f"{name} cannot be opened .*40000x20000.*at most 16384 columns"):
+    with pytest.raises(InputError, match=f"{name} cannot be opened .*40000x20000.*at most 20000 columns"):
         read_rgb(tmp_path / name)
     # The pixels would take 2.4 GB. KiB; the room is for OpenImageIO itself and the padding.
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000
@@ -135,9 +130,9 @@ def test_40000_columns_are_refused_before_allocation(tmp_path, name, padding):
 def test_not_a_picture(tmp_path):
     (tmp_path / "text.jpg").write_text("hello")
     (tmp_path / "empty.exr").write_bytes(b"")
-    write_oiio(tmp_path / "x.tif", RGB, ("R", "G", "B"))
-    for name in ("text.jpg", "empty.exr", "x.tif"):
-        with pytest.raises(InputError, match=rf"{name} .*give a JPEG, PNG, EXR or HDR"):
+    write_oiio(tmp_path / "x.tga", RGB, ("R", "G", "B"))
+    for name in ("text.jpg", "empty.exr", "x.tga"):
+        with pytest.raises(InputError, match=rf"{name} .*give a JPEG, PNG, TIFF, WebP, EXR or HDR"):
             read_rgb(tmp_path / name)
 
 
