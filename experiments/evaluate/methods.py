@@ -78,11 +78,12 @@ def _of_scene(gaussians: Gaussians, seconds: float, room: EvaluationRoom, camera
 def _refined(room: EvaluationRoom, output: Path) -> tuple[Gaussians, float]:
     """The main job's scene and its seconds without the writing, compilation included: as a user waits for it."""
     files = {"panorama": str(room.source.rgb), "distance": str(room.source.distance)}
+    given = room.config.input
     config: ReconstructConfig = dataclasses.replace(
         room.config,
         output=str(output),
         # The truth is in the picture's own frame, and it stands level.
-        input=InputConfig(**files, views=None, height=room.config.input.height, level=False),
+        input=InputConfig(**files, views=None, height=given.height, upsample=given.upsample, level=False),
         film=FilmConfig(width=16, height=16, step=10.0, yaw_step=3.0),  # nobody watches it
     )
     metrics = run_job(config, resume=True)
@@ -92,5 +93,6 @@ def _refined(room: EvaluationRoom, output: Path) -> tuple[Gaussians, float]:
 
 def recipe_of(config: ReconstructConfig) -> dict:
     """The part of a recipe that a result depends on, for JSON: all but where the main job reads and writes."""
-    table = dataclasses.asdict(config) | {"input": {"height": config.input.height}}
+    read = {"height": config.input.height, "upsample": config.input.upsample}
+    table = dataclasses.asdict(config) | {"input": read}
     return {name: json.loads(json.dumps(value)) for name, value in table.items() if name not in ("output", "film")}
