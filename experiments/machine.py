@@ -32,8 +32,7 @@ def machine_fault(error: Exception, lighter: str) -> str | None:
     None for any other error: a bug."""
     said = " ".join(str(error).split())[:200] or type(error).__name__
     if isinstance(error, MemoryError) or _NO_MEMORY.search(said):
-        used, has = (f"{x / 1e9:.1f} GB" for x in (_used_bytes(), machine_bytes()))
-        return f"the memory did not suffice ({said}); {used} of {has} were used: {lighter}"
+        return f"out of memory with {_used_bytes() / 1e9:.1f} GB in use ({said}): {lighter}"
     if isinstance(error, OSError) and error.errno in NO_ROOM:
         return f"{error.filename or 'a file'} cannot be written ({error.strerror}): free some space there"
     if jax.config.jax_platforms and not _platform_starts():

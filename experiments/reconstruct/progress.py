@@ -18,7 +18,8 @@ class Progress:
         # A log takes no control codes, whatever FORCE_COLOR says.
         self.console = Console(**plain, force_terminal=sys.stdout.isatty())
         columns = (TextColumn("{task.description:<12}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-        self.bars = Bars(*columns, console=self.console, transient=True)
+        unseen = not (self.console.is_interactive or self.console.is_jupyter)
+        self.bars = Bars(*columns, console=self.console, transient=True, disable=unseen)
         self.seconds, self.passed, self.looked = foreseen_seconds, 0.0, False
         self.paths, self.steps = config.explore.trajectories, max(config.refine.steps, 1)
         self.task = self.bars.add_task("reading", total=foreseen_seconds["total"])

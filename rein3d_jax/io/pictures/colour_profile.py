@@ -21,13 +21,21 @@ def srgb_by_profile(path: Path, spec: oiio.ImageSpec, rgb: np.ndarray) -> np.nda
     profile = spec.getattribute("ICCProfile")
     if profile is not None:
         return _by_icc(path, bytes(profile), rgb)
-    with Image.open(path) as header:
-        gamma, named = header.info.get("gamma"), header.info.get("chromaticity")
+    gamma, named = _named(path)
     primaries = _REC709 if named is None else (*named[2:], *named[:2])
     power = 1 / gamma if gamma else _SRGB_GAMMA[0]
     if abs(power - _SRGB_GAMMA[0]) < _SRGB_GAMMA[1] and np.allclose(primaries, _REC709, atol=_ALIKE):
         return rgb
     return srgb_from_linear(np.clip(rec709_light(rgb**power, primaries), 0, 1)).astype(np.float32)
+
+
+def _named(path: Path) -> tuple[float | None, tuple[float, ...] | None]:
+    """PNG's gAMA, and cHRM: x and y of white, red, green, blue. None where the file says nothing that can be read."""
+    try:
+        with Image.open(path, formats=["PNG"]) as header:
+            return header.info.get("gamma"), header.info.get("chromaticity")
+    except (OSError, ValueError, SyntaxError):  # no PNG, or one that OpenImageIO reads all the same
+        return None, None
 
 
 def rec709_light(light: np.ndarray, primaries: tuple[float, ...]) -> np.ndarray:

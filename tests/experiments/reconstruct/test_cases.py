@@ -4,6 +4,8 @@ cases/ holds them small, re-made after public reports, of one synthetic room; it
 pano.png and dist.exr. What would be large is written here.
 """
 
+import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ import pytest
 
 from experiments.reconstruct.inputs import InputConfig, told_panorama
 from rein3d_jax.errors import InputError
+from rein3d_jax.geometry.colour import srgb_from_linear
 from rein3d_jax.io.pictures.distance import read_distance
 from rein3d_jax.io.pictures.photo import read_photo, read_rgb
 
@@ -171,3 +174,24 @@ def test_wide_pictures_are_averaged_while_they_are_read(tmp_path):
     found = read_rgb(path)
     assert found.shape == (2304, 4608, 3)
     np.testing.assert_allclose(found[18::36, 18::36], rgb, atol=0.5 / 255 + 1e-6)  # bytes
+
+
+def test_linear_light_in_a_png_and_other_primaries_become_srgb(tmp_path):
+    """gAMA 1, and Adobe's primaries in cHRM: what a library reads of them, against the picture as it is."""
+    plain = (CASES / "pano.png").read_bytes()
+
+    def named(*chunks: tuple[bytes, bytes]) -> np.ndarray:
+        made = [struct.pack(">I", len(b)) + t + b + struct.pack(">I", zlib.crc32(t + b)) for t, b in chunks]
+        (tmp_path / "x.png").write_bytes(plain[:33] + b"".join(made) + plain[33:])
+        return read_rgb(tmp_path / "x.png")
+
+    as_it_is = read_rgb(CASES / "pano.png")
+    linear = named((b"gAMA", struct.pack(">I", 100000)))
+    np.testing.assert_allclose(linear, srgb_from_linear(as_it_is), atol=1e-5)
+    srgb = struct.pack(">8I", 31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000)
+    np.testing.assert_array_equal(named((b"gAMA", struct.pack(">I", 45455)), (b"cHRM", srgb)), as_it_is)
+    adobe = struct.pack(">8I", 31270, 32900, 64000, 33000, 21000, 71000, 15000, 6000)
+    wide = named((b"gAMA", struct.pack(">I", 45455)), (b"cHRM", adobe))
+    grey = as_it_is.max(axis=-1) - as_it_is.min(axis=-1) < 0.004  # white stays white, colours grow stronger
+    np.testing.assert_allclose(wide[grey], as_it_is[grey], atol=0.02)  # gamma 2.2 against sRGB's curve
+    assert np.ptp(wide, axis=-1).mean() > 1.05 * np.ptp(as_it_is, axis=-1).mean()
