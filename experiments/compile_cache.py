@@ -2,6 +2,7 @@
 
 import os
 import sys
+import warnings
 from pathlib import Path
 
 import jax
@@ -9,8 +10,9 @@ import jax
 
 def use_compile_cache() -> None:
     """Stores compiled programs in the user's home, unless JAX_COMPILATION_CACHE_DIR names a folder; all of them, since
-    the hundreds that compile in less than JAX's second take a minute together. Where nothing can be stored, says so:
-    JAX itself would warn once a program."""
+    the hundreds that compile in less than JAX's second take a minute together. Where nothing can be stored, says so
+    once: JAX itself would warn once a program."""
+    warnings.filterwarnings("ignore", "Error writing persistent compilation cache entry")
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0)
     folder = jax.config.jax_compilation_cache_dir or _at_home()
     if not _takes_files(folder):

@@ -8,11 +8,10 @@ each finished stage into its `stages` folder, from which --resume goes on.
 """
 
 import argparse
-import json
 import sys
 
 from experiments.command import CommandParser
-from experiments.config import load_config
+from experiments.config import load_config, toml_value
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.job import run_job
 from rein3d_jax.errors import InputError
@@ -41,11 +40,11 @@ def _overrides(options: argparse.Namespace) -> list[str]:
         raise InputError(f"the panorama is given twice, {options.panorama} and --input {options.input}: leave one out")
     chosen, panorama = [], options.panorama or options.input
     if panorama is not None:
-        chosen += [f"input.panorama={json.dumps(panorama)}", "input.distance=none", "input.views=none"]
+        chosen += [f"input.panorama={toml_value(panorama)}", "input.distance=none", "input.views=none"]
     if options.distance is not None:
-        chosen.append(f"input.distance={json.dumps(options.distance)}")
+        chosen.append(f"input.distance={toml_value(options.distance)}")
     if options.output is not None:
-        chosen.append(f"output={json.dumps(options.output)}")
+        chosen.append(f"output={toml_value(options.output)}")
     return chosen + options.set
 
 

@@ -44,7 +44,12 @@ def write_bytes(path: str | Path, data: bytes) -> None:
 
 def write_text(path: str | Path, text: str) -> None:
     """Writes `text` to `path` as UTF-8, whole or not at all. Raises InputError."""
-    write_bytes(path, text.encode())
+    try:
+        data = text.encode()
+    except UnicodeEncodeError as error:  # names of files in it, in no encoding that is known
+        raise InputError(f"{path} cannot be written (it would name {text[error.start - 20 : error.end]!a}, which is no "
+                         "Unicode): rename that file or folder") from error
+    write_bytes(path, data)
 
 
 def _sync(path: Path) -> None:
