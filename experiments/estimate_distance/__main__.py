@@ -19,7 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from experiments.command import CommandParser
-from experiments.config import load_config
+from experiments.config import load_config, toml_value
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.inputs import resolve, told_panorama
 from rein3d_jax.depth.level import LEANED, levelled
@@ -52,7 +52,7 @@ def _estimate(options: argparse.Namespace) -> None:
         raise InputError(f"--output {output}: the distance is written as EXR; let its name end in .exr")
     if output.resolve() == Path(options.input).resolve():
         raise InputError(f"--output {output} is the picture itself: choose another name")
-    given = [f"input.panorama={json.dumps(options.input)}", "input.distance=none", "input.views=none"]
+    given = [f"input.panorama={toml_value(options.input)}", "input.distance=none", "input.views=none"]
     given.append("input.upsample=none")  # its guessed detail says nothing of distance
     config = load_config(ReconstructConfig, options.config, given + options.set)
     rows = panorama_rows(resolve(config.input.panorama))  # a picture that is none is refused before the long part

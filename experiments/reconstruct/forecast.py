@@ -9,12 +9,14 @@ import dataclasses
 import hashlib
 import json
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import jax
 import numpy as np
 
 from experiments.reconstruct.config import ReconstructConfig
+from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.upsample import LEARNED
 
@@ -55,7 +57,8 @@ class SecondsForecast:
         # What was compiled now is read the next time.
         compiled = sum(programs["compile"].values()) > sum(_KEPT.values())
         following = self._programs(_KEPT) if compiled else made
-        write_text(self.file, json.dumps(self.known | {"slowness": slowness, self.key: following}))
+        with suppress(InputError):  # a full disk may not undo a finished job
+            write_text(self.file, json.dumps(self.known | {"slowness": slowness, self.key: following}))
 
     def _slowness(self) -> dict[str, float]:
         """Of this machine, by stage, against the model's."""

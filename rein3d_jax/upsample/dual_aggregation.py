@@ -12,12 +12,13 @@ from functools import partial
 import flax.linen as nn
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from rein3d_jax.geometry.resample import pad_sphere
 from rein3d_jax.upsample.window_attention import Window, window_attention
 
 _STEP = 32  # a picture's rows, and half its columns, are a multiple of this: the longer side of a window
-_MEAN = jnp.array([0.4488, 0.4371, 0.4040])  # of the pictures that it was trained on
+_MEAN = np.array([0.4488, 0.4371, 0.4040], np.float32)  # of the pictures that it was trained on
 _EPSILON = 1e-5  # of its layer norms
 _OVER_POLES = 16  # rows that the network sees beyond each pole
 

@@ -46,9 +46,9 @@ def write_text(path: str | Path, text: str) -> None:
     """Writes `text` to `path` as UTF-8, whole or not at all. Raises InputError."""
     try:
         data = text.encode()
-    except UnicodeEncodeError as error:  # names of files in it, in no encoding that is known
-        raise InputError(f"{path} cannot be written (it would name {text[error.start - 20 : error.end]!a}, which is no "
-                         "Unicode): rename that file or folder") from error
+    except UnicodeEncodeError as error:  # Python reads such a name with lone surrogates
+        told = "it would hold the name of a file or folder that is not Unicode"
+        raise InputError(f"{path} cannot be written ({told}): rename that one") from error
     write_bytes(path, data)
 
 

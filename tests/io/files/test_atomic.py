@@ -59,6 +59,51 @@ def test_the_disk_really_full(tmp_path, file_size_limit):
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] == resource.RLIM_INFINITY  # the limit is off again
 
 
+def _refusing_folders(monkeypatch, name, error):
+    """os.fsync or os.open of a folder raises `error`."""
+    plain = getattr(os, name)
+
+    def refuse(which, *rest, **more):
+        if os.path.isdir(which):
+            raise error
+        return plain(which, *rest, **more)
+
+    monkeypatch.setattr(os, name, refuse)
+
+
+@pytest.mark.parametrize(
+    ("name", "error"),
+    [
+        ("fsync", OSError(errno.EINVAL, "Invalid argument")),  # network shares, FUSE
+        ("fsync", OSError(errno.ENOTSUP, "Operation not supported")),
+        ("open", PermissionError(errno.EACCES, "Permission denied")),  # Windows
+    ],
+)
+def test_a_folder_that_cannot_be_synced_is_forgiven(tmp_path, monkeypatch, name, error):
+    _refusing_folders(monkeypatch, name, error)
+    write_bytes(tmp_path / "x.bin", b"whole")
+    assert (tmp_path / "x.bin").read_bytes() == b"whole" and os.listdir(tmp_path) == ["x.bin"]
+
+
+def test_a_file_or_a_folder_that_the_disk_refuses_to_sync_is_not(tmp_path, monkeypatch):
+    with monkeypatch.context() as patch, pytest.raises(InputError, match=r"x.bin cannot be written \(Input/output"):
+        _refusing_folders(patch, "fsync", OSError(errno.EIO, "Input/output error"))
+        write_bytes(tmp_path / "x.bin", b"")
+
+    def full(_):
+        raise OSError(errno.EINVAL, "Invalid argument")
+
+    monkeypatch.setattr(os, "fsync", full)  # the file's, too
+    with pytest.raises(InputError, match=r"y.bin cannot be written \(Invalid argument"):
+        write_bytes(tmp_path / "y.bin", b"")
+
+
+def test_text_that_holds_an_undecodable_name_is_refused_in_a_line(tmp_path):
+    with pytest.raises(InputError, match=r"x.toml cannot be written .* not Unicode"):
+        write_text(tmp_path / "x.toml", 'output = "a\udcff"')
+    assert not os.listdir(tmp_path)
+
+
 def test_unwritable_targets_are_named(tmp_path):
     (tmp_path / "file").write_text("a file, not a folder")
     (tmp_path / "folder").mkdir()
