@@ -189,3 +189,11 @@ def test_a_folder_may_have_any_name(name):
     options = parser.parse_args([f"{name}/a.png", "--output", name, "--distance", f"{name}/d.exr"])
     config = load_config(ReconstructConfig, options.config, _overrides(options))
     assert (config.output, config.input.panorama, config.input.distance) == (name, f"{name}/a.png", f"{name}/d.exr")
+
+
+def test_no_command_starts_a_device_before_its_arguments_are_read():
+    """Or JAX_PLATFORMS at fault would be a traceback, and several hosts could not be joined."""
+    names = ("reconstruct", "view", "export", "evaluate", "build_dataset", "estimate_distance", "build_examples")
+    imports = "; ".join(f"import experiments.{name}.__main__" for name in names)
+    check = "from jax._src import xla_bridge; assert not xla_bridge.backends_are_initialized()"
+    subprocess.run([sys.executable, "-c", f"{imports}; {check}"], check=True)
