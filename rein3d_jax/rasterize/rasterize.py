@@ -41,7 +41,9 @@ class Frame:
 
     rgb: jax.Array  # (h, w, 3) premultiplied: the scene over black
     alpha: jax.Array  # (h, w) in [0, 1)
-    distance: jax.Array | None  # (h, w) metres along the ray, mean over what is seen; 0 where nothing is
+    # (h, w) metres along the ray, harmonic mean over what is seen, or the little that a wall lets through of what lies
+    # far behind it would move the wall; 0 where nothing is
+    distance: jax.Array | None
     needed: jax.Array  # (4,) buffer sizes this view called for, in the order of `Buffers`
     overflow: jax.Array  # () entries dropped; 0 or the picture is not the scene's
 
@@ -64,13 +66,15 @@ def _rasterize(
     overflow = jnp.sum(jnp.maximum(needed - jnp.array(buffers), 0))
     tiles = composite_chunks(splats, _values(splats, config), chunks, camera, config.tile)
     image = from_tiles(tiles, camera, config.tile)
-    distance = safe_divide(image[..., 3], image[..., 4]) if config.distance else None
+    distance = safe_divide(image[..., 4], image[..., 3]) if config.distance else None
     return Frame(image[..., :3], image[..., -1], distance, needed, overflow)
 
 
 def _values(splats: Splats, config: RasterizeConfig) -> jax.Array:
     """The values (n, 3 or 4) that are composited."""
-    return jnp.concatenate([splats.rgb, splats.distance[:, None]], axis=-1) if config.distance else splats.rgb
+    if not config.distance:
+        return splats.rgb
+    return jnp.concatenate([splats.rgb, safe_divide(jnp.ones(()), splats.distance)[:, None]], axis=-1)
 
 
 rasterize = jax.jit(_rasterize, static_argnames=("config", "buffers"))

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from rein3d_jax.conventions import ALPHA_CUT, ALPHA_MAX
+from rein3d_jax.geometry.safe import safe_divide
 from rein3d_jax.rasterize.config import RasterizeConfig
 from rein3d_jax.rasterize.pixels import pixel_features
 from rein3d_jax.rasterize.project import project
@@ -15,7 +16,7 @@ from rein3d_jax.scene import Camera, Gaussians
 
 
 def rasterize_reference(gaussians: Gaussians, camera: Camera, *, config: RasterizeConfig) -> tuple:
-    """Premultiplied rgb (h, w, 3), alpha (h, w), weighted distance (h, w), in O(n h w) time and memory."""
+    """Premultiplied rgb (h, w, 3), alpha (h, w), weighted inverse distance (h, w), in O(n h w) time and memory."""
     splats = project(gaussians, camera, config=config)
     order = jnp.argsort(jnp.where(splats.visible, splats.distance, jnp.inf))
     splats = jax.tree.map(lambda x: x[order], splats)
@@ -27,5 +28,5 @@ def rasterize_reference(gaussians: Gaussians, camera: Camera, *, config: Rasteri
     through = jnp.cumprod(1 - alpha, axis=0)
     weight = alpha * jnp.concatenate([jnp.ones_like(through[:1]), through[:-1]])
     rgb = jnp.einsum("nhw,nc->hwc", weight, splats.rgb, precision="highest")
-    distance = jnp.einsum("nhw,n->hw", weight, splats.distance, precision="highest")
-    return rgb, 1 - through[-1], distance
+    inverse = jnp.einsum("nhw,n->hw", weight, safe_divide(jnp.ones(()), splats.distance), precision="highest")
+    return rgb, 1 - through[-1], inverse

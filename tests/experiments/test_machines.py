@@ -60,7 +60,13 @@ def work(options):
 sys.exit(CommandParser("wall", "A wall.").run(work, []))
 """
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    return subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env={**os.environ, **environment}, **pipes)
+    environment = {**os.environ, **environment}
+    # Tests in the background of a shell have Ctrl-C ignored, and hand that on.
+    return subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env=environment, preexec_fn=_heeds_ctrl_c, **pipes)
+
+
+def _heeds_ctrl_c():
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import pytest
 
 from rein3d_jax.conventions import PINHOLE
 from rein3d_jax.geometry.poses import equirectangular_camera, pinhole_camera, upright
+from rein3d_jax.geometry.safe import safe_divide
 from rein3d_jax.rasterize import Buffers, RasterizeConfig, rasterize
 from rein3d_jax.rasterize.reference import rasterize_reference
 from rein3d_jax.scene import Camera, Gaussians
@@ -42,9 +43,9 @@ def make_camera(model: str, pose: jax.Array | None = None) -> Camera:
 
 
 def picture(gaussians: Gaussians, camera: Camera, config: RasterizeConfig, buffers: Buffers) -> tuple:
-    """(rgb, alpha, distance x alpha): what the oracle returns."""
+    """(rgb, alpha, alpha / distance): what the oracle returns."""
     frame = rasterize(gaussians, camera, config=config, buffers=buffers)
-    return frame.rgb, frame.alpha, frame.distance * frame.alpha
+    return frame.rgb, frame.alpha, safe_divide(frame.alpha, frame.distance)
 
 
 def oracle(gaussians: Gaussians, camera: Camera, config: RasterizeConfig, buffers: Buffers) -> tuple:

@@ -11,6 +11,7 @@ from rein3d_jax.conventions import EQUIRECTANGULAR, PINHOLE
 from rein3d_jax.geometry.poses import upright
 from rein3d_jax.geometry.rotations import matrix_from_quats, quats_from_matrix, yaw_quat
 from rein3d_jax.rasterize import rasterize
+from rein3d_jax.scene import Gaussians
 
 MODELS = pytest.mark.parametrize("model", [PINHOLE, EQUIRECTANGULAR])
 
@@ -64,6 +65,19 @@ def test_an_empty_scene_is_black(model, scene_of, camera_of, config, fast) -> No
     dead = scene.replace(alive=jnp.zeros_like(scene.alive))
     for leaf in jax.tree.leaves(fast(dead, camera_of(model), config=config)):
         assert not np.any(leaf)
+
+
+@MODELS
+def test_what_shines_through_a_wall_from_far_behind_hardly_moves_it(model, camera_of, config, roomy) -> None:
+    """A hundredth of what lies 100 m away would make 2 m 3; the harmonic mean makes it 2.02."""
+    camera = camera_of(model, upright(jnp.zeros(3)))
+    means, opacity = jnp.array([[2.0, 0, 0], [100.0, 0, 0]]), jnp.log(jnp.array([99.0, 99.0]))
+    sizes = jnp.log(jnp.array([[0.5] * 3, [25.0] * 3]))
+    quats, alive = jnp.tile(jnp.array([1.0, 0, 0, 0]), (2, 1)), jnp.ones(2, bool)
+    scene = Gaussians(means, sizes, quats, opacity, jnp.zeros((2, 1, 3)), alive)
+    frame = rasterize(scene, camera, config=config, buffers=roomy)
+    middle = frame.distance[camera.height // 2, camera.width // 2]
+    np.testing.assert_allclose(middle, 2.0, rtol=0.05)  # the splat's own curve from its middle on
 
 
 def test_one_vmap_over_cameras_equals_calls_one_by_one(scene_of, camera_of, config, roomy) -> None:
