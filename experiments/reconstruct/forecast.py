@@ -16,6 +16,7 @@ import jax
 import numpy as np
 
 from experiments.reconstruct.config import ReconstructConfig
+from experiments.reconstruct.inputs import InputConfig
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.upsample import LEARNED
@@ -33,16 +34,16 @@ class SecondsForecast:
     """The seconds of one job; the file beside the kept programs remembers what jobs took."""
 
     def __init__(self, config: ReconstructConfig, rows: int, *, upsampled: bool):
-        self.work = _work(config, rows, upsampled=upsampled)
+        self.work, self.keys = _work(config, rows, upsampled=upsampled), _keys(config, rows, upsampled=upsampled)
         self.looks = 1.5 if config.input.distance is None else 1.0  # the network's programs are read's, too
-        self.key = hashlib.sha256(repr((jax.__version__, rows, upsampled, _shaping(config))).encode()).hexdigest()[:16]
         folder = jax.config.jax_compilation_cache_dir
         self.file = None if folder is None else Path(folder) / "seconds.json"
         self.known = {} if self.file is None else recalled(self.file)
 
     def seconds(self) -> dict[str, float]:
         """By stage, and their total."""
-        slowness, programs = self._slowness(), self.known.get(self.key) or self._programs(_COMPILED)
+        slowness, compiled = self._slowness(), self._programs(_COMPILED)
+        programs = {stage: self.known.get(key, compiled[stage]) for stage, key in self.keys.items()}
         found = {stage: round(slowness[stage] * self.work[stage] + programs[stage], 1) for stage in COUNTED}
         return found | {"total": round(sum(found.values()), 1)}
 
@@ -50,19 +51,21 @@ class SecondsForecast:
         """Keeps what a whole job took by stage, and how much of that for tracing and for compiling."""
         if self.file is None:
             return
-        made, slowness = {stage: sum(of[stage] for of in programs.values()) for stage in COUNTED}, self._slowness()
-        for stage in COUNTED:
-            if 2 * made[stage] < seconds[stage]:  # or what is left between two threads' compilers says little
-                slowness[stage] = (seconds[stage] - made[stage]) / self.work[stage]
-        # What was compiled now is read the next time.
-        compiled = sum(programs["compile"].values()) > sum(_KEPT.values())
-        following = self._programs(_KEPT) if compiled else made
+        slowness, kept, found = self._slowness(), self._programs(_KEPT), dict(self.known)
+        for stage, key in self.keys.items():
+            made = sum(of[stage] for of in programs.values())
+            if 2 * made < seconds[stage]:  # or what is left between two threads' compilers says little
+                slowness[stage] = (seconds[stage] - made) / self.work[stage]
+            # What was compiled now is read the next time.
+            found[key] = kept[stage] if programs["compile"][stage] > kept[stage] + 0.5 else made
         with suppress(InputError):  # a full disk may not undo a finished job
-            write_text(self.file, json.dumps(self.known | {"slowness": slowness, self.key: following}))
+            write_text(self.file, json.dumps(found | slowness))
 
     def _slowness(self) -> dict[str, float]:
         """Of this machine, by stage, against the model's."""
-        return self.known.get("slowness") or dict.fromkeys(COUNTED, _calibration() / _CALIBRATED)
+        if all(stage in self.known for stage in COUNTED):
+            return {stage: self.known[stage] for stage in COUNTED}
+        return dict.fromkeys(COUNTED, _calibration() / _CALIBRATED)
 
     def _programs(self, table: dict[str, float]) -> dict[str, float]:
         return table | {"read": self.looks * table["read"]}
@@ -87,17 +90,21 @@ def _work(config: ReconstructConfig, rows: int, *, upsampled: bool) -> dict[str,
     }
 
 
-def _shaping(config: ReconstructConfig) -> ReconstructConfig:
-    """The config without what changes no program."""
-    files = dataclasses.replace(config.input, panorama="", distance=config.input.distance and "given", views=None)
-    return dataclasses.replace(config, input=files, output="", seed=0)
+def _keys(config: ReconstructConfig, rows: int, *, upsampled: bool) -> dict[str, str]:
+    """What each stage's programs depend on, hashed: the sizes and settings, not which picture it is."""
+    plain = dataclasses.replace(config, input=InputConfig(), output="", seed=0)
+    of_input = dataclasses.replace(config.input, panorama="", distance=config.input.distance and "given", views=None)
+    depends = {stage: (jax.__version__, rows, plain) for stage in COUNTED}
+    depends["read"] = (jax.__version__, rows, upsampled, of_input, config.depth, config.shell)
+    return {s: f"{s} {hashlib.sha256(repr(on).encode()).hexdigest()[:16]}" for s, on in depends.items()}
 
 
-def recalled(file: Path) -> dict[str, dict[str, float]]:
-    """What a `SecondsForecast` kept in its file; {} where it cannot be read."""
+def recalled(file: Path) -> dict[str, float]:
+    """What a `SecondsForecast` kept in its file, slowness by stage and seconds for programs by stage and hash; {} where it
+    cannot be read."""
     try:
         found = json.loads(file.read_text("utf-8"))
-        return found if all(set(by_stage) == set(COUNTED) for by_stage in found.values()) else {}
+        return found if all(isinstance(number, float) for number in found.values()) else {}
     except (OSError, ValueError, TypeError, AttributeError):
         return {}  # nothing is kept yet, or by another version
 

@@ -40,7 +40,7 @@ def test_after_compiling_the_next_one_is_foreseen_to_be_faster(tmp_path):
 
 def test_a_slower_machine_is_slower_for_other_sizes_too(tmp_path):
     first = forecast(tmp_path, rows=512)
-    first.known = {"slowness": dict.fromkeys(COUNTED, 1.0)}
+    first.known = dict.fromkeys(COUNTED, 1.0)
     by_model = first.seconds()
     forecast(tmp_path, rows=256).remember({s: 100 * x for s, x in SECONDS.items()}, programs(0.2))
     assert forecast(tmp_path, rows=512).seconds()["lift"] > 5 * by_model["lift"]
@@ -50,3 +50,11 @@ def test_a_slower_machine_is_slower_for_other_sizes_too(tmp_path):
 def test_a_damaged_memory_is_no_memory(tmp_path, content):
     (tmp_path / "seconds.json").write_text(content)
     assert forecast(tmp_path).known == {}
+
+
+def test_programs_are_shared_by_pictures_with_a_distance_and_without(tmp_path):
+    """All but reading's: another picture of the same size finds the others compiled."""
+    forecast(tmp_path).remember(SECONDS, programs(0.2))
+    photo = forecast(tmp_path, input=dataclasses.replace(CONFIG.input, distance=None)).seconds()
+    given = forecast(tmp_path).seconds()
+    assert photo["read"] > given["read"] + 5 and all(photo[s] == given[s] for s in COUNTED if s != "read")
