@@ -100,8 +100,7 @@ def _keys(config: ReconstructConfig, rows: int, *, upsampled: bool) -> dict[str,
 
 
 def recalled(file: Path) -> dict[str, float]:
-    """What a `SecondsForecast` kept in its file, slowness by stage and seconds for programs by stage and hash; {} where it
-    cannot be read."""
+    """What a `SecondsForecast` kept: slowness by stage, seconds for programs by stage and hash; {} for no such file."""
     try:
         found = json.loads(file.read_text("utf-8"))
         return found if all(isinstance(number, float) for number in found.values()) else {}
