@@ -19,7 +19,7 @@ from rein3d_jax.io.files.input_file import require_file
 from rein3d_jax.io.pictures.distance import read_distance
 from rein3d_jax.io.pictures.gpano import Pose
 from rein3d_jax.io.pictures.panorama import whole_colours
-from rein3d_jax.io.pictures.photo import panorama_rows, read_photo
+from rein3d_jax.io.pictures.photo import Photo, panorama_rows, read_photo
 from rein3d_jax.io.rooms import traced_room
 from rein3d_jax.io.rooms.traced_room import View
 from rein3d_jax.scene import Panorama
@@ -141,9 +141,14 @@ def _picture(path: Path, config: InputConfig, upsampler: dict | None) -> tuple[j
     rgb = jnp.asarray(whole_colours(photo, config.own_rows(rows)))
     for _ in range(config.doublings(rows)):
         rgb = upsample_picture(rgb, config.upsample, upsampler)
+    return rgb, photo.pose, _made_up(photo)
+
+
+def _made_up(photo: Photo) -> str:
+    if photo.seen.all():
+        return ""
     unseen = 1 - float(coverage(jnp.asarray(photo.seen, jnp.float32)))
-    told = f"{unseen:.1%} of the picture is transparent, black at a pole or cropped away: it takes the colours around"
-    return rgb, photo.pose, told if unseen > 0 else ""
+    return f"{unseen:.1%} of the picture is transparent, black at a pole or cropped away: it takes the colours around"
 
 
 def _levelled(panorama: Panorama, config: InputConfig, pose: Pose) -> tuple[Panorama, Lean]:

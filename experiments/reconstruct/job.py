@@ -114,19 +114,18 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str, Lean]:
         jax.__version__,
     ]
     panorama, *about = job.stage("read", depends, lambda: _read(job))
-    estimated, told, lean = bool(about[0]), *about[1:]
     coarse = job.stage("lift", job.settings("lift"), lambda: lift_scene(panorama, config.lift))
     trajectories = job.stage(
         "explore", job.settings("explore"), lambda: radial_trajectories(panorama, config=config.explore)
     )
     known = Survey(panorama, coarse, trajectories)
-    job.look(known, (estimated, told, lean))
+    job.look(known, about)
     explored = list(_explored(job, known, key))
     scene, curves, stopped = job.stage(
         "refine", job.settings("refine"), lambda: _refined(job, known, explored, jax.random.fold_in(key, 1))
     )
     why = ALL_PATHS if len(explored) == config.explore.trajectories else OUT_OF_TIME
-    return joined(known, explored, (scene, curves, stopped), why), estimated, told, lean
+    return joined(known, explored, (scene, curves, stopped), why), bool(about[0]), *about[1:]
 
 
 def _read(job: _Job):

@@ -49,9 +49,12 @@ def _beyond(numbers: np.ndarray) -> np.ndarray:
     """Where numbers stand for "nothing there": what only a code or a far clip can be."""
     whole = numbers.dtype.kind in "ui"
     beyond = numbers == np.iinfo(numbers.dtype).max if whole else numbers.astype(np.float64) > _NOWHERE
-    values, counts = np.unique(numbers[np.isfinite(numbers) & ~beyond & (numbers > 0)], return_counts=True)
+    known = numbers[np.isfinite(numbers) & ~beyond & (numbers > 0)]
+    if not known.size or np.count_nonzero(known == known.max()) <= _SUSPICIOUS * known.size:
+        return beyond  # as nearly every map: to count all of a large one's values takes seconds
+    values, counts = np.unique(known, return_counts=True)
     # A map has thousands of values, and its farthest stands in a corner: of a clipped one it stands everywhere.
-    if values.size > _MANY and counts[-1] > max(_SUSPICIOUS * counts.sum(), 10 * np.median(counts)):
+    if values.size > _MANY and counts[-1] > 10 * np.median(counts):
         beyond |= numbers == values[-1]
     return beyond
 

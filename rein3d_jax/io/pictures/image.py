@@ -18,16 +18,18 @@ def resize_panorama(
     grows). Distance and validity are picked at the nearest sample: two surfaces never mix.
     """
     assert rgb.shape[1] == 2 * rgb.shape[0], rgb.shape
-    return _resize_colour(rgb, height), *(None if x is None else _picked(x, height) for x in (distance, valid))
+    return resize_colour(rgb, height), *(None if x is None else picked(x, height) for x in (distance, valid))
 
 
-def _picked(values: np.ndarray, height: int) -> np.ndarray:
+def picked(values: np.ndarray, height: int) -> np.ndarray:
+    """Values (h, 2 h) at `height` rows, each the nearest sample."""
     if height == len(values):
         return values
     return values[np.ix_(_nearest(len(values), height), _nearest(2 * len(values), 2 * height))]
 
 
-def _resize_colour(rgb: np.ndarray, height: int) -> np.ndarray:
+def resize_colour(rgb: np.ndarray, height: int) -> np.ndarray:
+    """Picture (h, 2 h, c) at `height` rows, as `resize_panorama` says."""
     if height == len(rgb):
         return rgb
     if height < len(rgb):  # areas of a 2:1 grid never reach across the seam
