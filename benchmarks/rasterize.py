@@ -14,7 +14,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from benchmarks.engines.worker import ENGINES, INSTALL, Worker
+from benchmarks.engines.worker import ENGINES, INSTALL, ON_CPU, Worker
 from benchmarks.workloads import SIZES
 from experiments.command import CommandParser
 from rein3d_jax.errors import InputError
@@ -123,7 +123,8 @@ def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where an argument is at fault."""
     parser = CommandParser("rasterize", __doc__, "benchmarks")
     add_rounds(parser)
-    parser.add_argument("--engines", default=",".join(ENGINES), metavar="A,B", help="default: all of %(default)s")
+    parser.add_argument("--engines", default=",".join(ON_CPU), metavar="A,B",
+                        help=f"of {', '.join(ENGINES)} (default: %(default)s)")  # fmt: skip
     return parser.run(_run, arguments)
 
 

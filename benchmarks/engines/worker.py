@@ -13,8 +13,10 @@ ENGINES = {
     "prototype": "benchmarks.engines.prototype",
     "gsplat-torch": "benchmarks.engines.gsplat_torch",
     "gsplat-torch-vectorised": "benchmarks.engines.gsplat_vectorised",
+    "gsplat-cuda": "benchmarks.engines.gsplat_cuda",  # for an NVIDIA GPU
 }
-INSTALL = {name: "pip install -e '.[bench]'" for name in ("gsplat-torch", "gsplat-torch-vectorised")}
+ON_CPU = [name for name in ENGINES if name != "gsplat-cuda"]
+INSTALL = {name: "pip install -e '.[bench]'" for name in ENGINES if name.startswith("gsplat")}
 
 
 class Worker:

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from experiments.compile_clock import program_seconds
+from rein3d_jax import __version__
 from rein3d_jax.depth.level import Lean
 from rein3d_jax.errors import InputError
 from rein3d_jax.explore.trajectories import Trajectories
@@ -62,7 +63,7 @@ class StageStore:
     def __init__(self, folder: Path, refine: RefineConfig, *, resume: bool):
         self.folder, self.resume, self.blanks = folder, resume, blank_stages(refine)
         self.finished: list[Finished] = []
-        self.key = ""
+        self.key = __version__  # what another version of this package made is made again
 
     def run(self, name: str, depends: Any, make: Callable[[], Any]) -> Any:
         """The result of stage `name` ("restore-03" is one of the kind "restore"): read if finished, else made and
