@@ -1,6 +1,8 @@
-// What walk.js uses of three and Spark: nothing else gets into the bundle.
+// What the page's code uses of three and Spark: nothing else gets into the bundle.
 export {
-  BackSide, Color, Mesh, NoColorSpace, PerspectiveCamera, Scene, ShaderMaterial, SphereGeometry, SRGBColorSpace,
-  TextureLoader, WebGLRenderer,
+  BackSide, BufferAttribute, BufferGeometry, Color, DataTexture, DoubleSide, Group, InstancedBufferGeometry, Line,
+  LineBasicMaterial, LineLoop, Matrix4, Mesh, MeshBasicMaterial, NoColorSpace, PerspectiveCamera, Quaternion,
+  RGBAIntegerFormat, RingGeometry, Scene, ShaderMaterial, SphereGeometry, SRGBColorSpace, TextureLoader,
+  UnsignedIntType, Vector3, WebGLRenderer,
 } from "three";
 export { SparkRenderer, SplatFileType, SplatMesh } from "@sparkjsdev/spark";

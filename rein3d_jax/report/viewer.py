@@ -1,4 +1,5 @@
-"""The viewer page, one HTML file to move through a scene in: opened by a double click, it asks nothing of the network.
+"""The viewer page, one HTML file to move through a scene in, by keys, fingers, gamepad or headset: opened by a double
+click, it asks nothing of the network.
 
 Pure: scenes and panorama come in encoded, the page goes out as text. A policy in the page forbids every request. The
 page's parts are this package's viewer_page/; its libraries (three and Spark, MIT) were bundled by
@@ -23,6 +24,8 @@ _POLICY = (
     "connect-src data: blob:; script-src 'unsafe-inline' 'wasm-unsafe-eval' data: blob:"
 )
 _SERVED_POLICY = _POLICY.replace("connect-src", "connect-src 'self'")
+# One script, in this order.
+_CODE = ("place", "draw_list", "splats", "picture", "map", "hands", "keepsakes", "headset", "walk")
 _FILTER_VARIANCE = 0.3  # pixels^2, RasterizeConfig's; pass the scene's own where it was made with another
 
 
@@ -61,7 +64,7 @@ def render_viewer(
         "licences": escape(_file("LICENCES.txt")),
         "data": json.dumps(payload, allow_nan=False).replace("<", "\\u003c"),  # no name can end the script
         "bundle": _file("bundle.js"),
-        "walk": _file("walk.js"),
+        "walk": "".join(_file(f"{name}.js") for name in _CODE),
     }
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], _file("page.html"))
 

@@ -14,7 +14,7 @@ from rein3d_jax.io.exports.point_cloud import Points, write_points
 from rein3d_jax.io.exports.posed_picture import IMAGES, MASKS, PosedPicture, write_posed_picture
 from rein3d_jax.io.files.atomic import write_text
 
-_OPENCV_FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
+OPENCV_FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 def write_nerfstudio(folder: Path, pictures: Iterable[PosedPicture], points: Points) -> int:
@@ -33,5 +33,5 @@ def _frame(folder: Path, picture: PosedPicture) -> dict:
     return {
         "file_path": f"{IMAGES}/{name}", "mask_path": f"{MASKS}/{name}",
         "w": camera.width, "h": camera.height, "fl_x": fl_x, "fl_y": fl_y, "cx": cx, "cy": cy,
-        "transform_matrix": (picture.pose @ _OPENCV_FROM_OPENGL).tolist(),
+        "transform_matrix": (picture.pose @ OPENCV_FROM_OPENGL).tolist(),
     }  # fmt: skip

@@ -11,7 +11,7 @@ from rein3d_jax.io.files.atomic import write_bytes
 from rein3d_jax.io.pictures.image import to_uint8
 
 _MEND = "pip install 'rein3d-jax[export]'"
-_Y_UP_FROM_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # glTF's, as Blender undoes it
+Y_UP_FROM_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # glTF's, as Blender undoes it
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def without_islands(surface: Surface, area: float) -> Surface:
 
 def write_glb(path: Path, surface: Surface) -> None:
     """Writes the mesh, Y up as glTF wants and with linear colours, atomically. Raises InputError."""
-    mesh = _trimesh().Trimesh(surface.vertices @ _Y_UP_FROM_Z_UP.T, surface.faces, process=False)
+    mesh = _trimesh().Trimesh(surface.vertices @ Y_UP_FROM_Z_UP.T, surface.faces, process=False)
     opaque = np.full((len(surface.colours), 1), 255, np.uint8)
     mesh.visual.vertex_colors = np.hstack([to_uint8(linear_from_srgb(np.clip(surface.colours, 0, 1))), opaque])
     write_bytes(path, mesh.export(file_type="glb"))

@@ -28,7 +28,7 @@ _SCALE_LIMIT = 20.0  # log scales beyond are clipped, as SuperSplat does
 def write_compressed_ply(path: str | Path, gaussians: Gaussians) -> None:
     """Writes the alive slots, atomically. Raises InputError, and writes nothing, if a value is not finite."""
     columns = alive_columns(gaussians, path)
-    order = _morton_order(columns.means)
+    order = morton_order(columns.means)
     means, log_scales, quats, logits, sh = (field[order] for field in columns)
     count = len(means)
     places, place_bounds = _pack_bounded(means, (11, 10, 11))
@@ -68,7 +68,7 @@ def read_compressed_ply(path: str | Path) -> Gaussians:
     return from_columns(Columns(*(field.astype(np.float32) for field in fields)), path)
 
 
-def _morton_order(means: np.ndarray) -> np.ndarray:
+def morton_order(means: np.ndarray) -> np.ndarray:
     """Indices (n,) along a curve that stays among neighbours: 10 bits of x, y and z, interleaved."""
     means = means.astype(np.float64)
     low, high = means.min(axis=0, initial=np.inf), means.max(axis=0, initial=-np.inf)

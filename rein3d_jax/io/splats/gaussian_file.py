@@ -1,14 +1,15 @@
-"""A scene's file, its format by its suffix: .ply (3DGS), .compressed.ply (SuperSplat), .spz, .splat."""
+"""A scene's file, its format by its suffix: .ply (3DGS), .compressed.ply (SuperSplat), .spz, .splat; .sog to write."""
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.splats.compressed_ply import is_compressed_ply, read_compressed_ply, write_compressed_ply
 from rein3d_jax.io.splats.ply import read_ply, write_ply
+from rein3d_jax.io.splats.sog import write_sog
 from rein3d_jax.io.splats.splat import read_splat, write_splat
 from rein3d_jax.io.splats.spz import read_spz, write_spz
+from rein3d_jax.io.splats.up_axis import UP_AXES, with_up
 from rein3d_jax.scene import Gaussians
 
 
@@ -36,12 +37,14 @@ def read_splats(path: str | Path) -> Gaussians:
     return _format(path)[0](path)
 
 
-def write_splats(path: str | Path, gaussians: Gaussians, *, antialias: bool = False) -> None:
+def write_splats(path: str | Path, gaussians: Gaussians, *, antialias: bool = False, up: str = "z") -> None:
     """Writes the alive slots to `path`, atomically; what a format cannot hold is in its module. `antialias` is
-    write_ply's; .compressed.ply and .splat have no place for it. Raises InputError."""
-    write = _format(path)[1]
-    write = partial(write, antialias=antialias) if write in (write_ply, write_spz) else write
-    write(path, gaussians)
+    write_ply's; .compressed.ply and .splat have no place for it. `up` is one of UP_AXES: the axes of the scene that
+    read_splats, or a converter to PLY, gets back. Raises InputError."""
+    write = write_sog if Path(path).suffix.lower() == ".sog" else _format(path)[1]
+    told = {"antialias": antialias} if write in (write_ply, write_spz, write_sog) else {}
+    told |= {"axes": UP_AXES[up][1]} if write is write_ply else {}
+    write(path, with_up(gaussians, up), **told)
 
 
 def _format(path: str | Path) -> tuple[Callable[..., Gaussians], Callable[..., None]]:

@@ -17,19 +17,21 @@ from rein3d_jax.io.splats.ply_table import find_vertices, read_columns
 from rein3d_jax.scene import Gaussians
 
 _NORMALS = ["nx", "ny", "nz"]  # always 0: viewers expect the columns, nobody reads them
-_ANTIALIASED = "comment antialiased (Mip-Splatting, eq. 9)"
+_ANTIALIASED = "comment SplatRenderMode: mip"  # Mip-Splatting, eq. 9, as Brush and SuperSplat say it
 _RGB = ["red", "green", "blue"]  # bytes: what nerfstudio writes for f_dc with --ply-color-mode rgb
 
 
-def write_ply(path: str | Path, gaussians: Gaussians, *, antialias: bool = False) -> None:
-    """Writes the alive slots, atomically. `antialias` says in the header that the scene was made for a rasterizer that
-    scales opacity by what its filter spreads out; the layout has no field for it, and one that does not shows small
-    splats too dense. Raises InputError, and writes nothing, if any value is not finite."""
+def write_ply(path: str | Path, gaussians: Gaussians, *, antialias: bool = False, axes: str = "Z up") -> None:
+    """Writes the alive slots, atomically. `axes` is what the header says of them; `antialias` says there that the scene
+    was made for a rasterizer that scales opacity by what its filter spreads out: the layout has no field for it, and
+    one that does not shows small splats too dense. Raises InputError, and writes nothing, if any value is not finite.
+    """
     table = _table(gaussians)
     require_finite(path, table)
     names = _property_names(_numbered("f_dc", 3), _numbered("f_rest", table.shape[1] - 17))
     names[3:3] = _NORMALS
-    lines = ["ply", "format binary_little_endian 1.0", *[_ANTIALIASED] * antialias, f"element vertex {len(table)}"]
+    lines = ["ply", "format binary_little_endian 1.0", f"comment {axes}, metres, right-handed"]
+    lines += [*[_ANTIALIASED] * antialias, f"element vertex {len(table)}"]
     lines += [f"property float {name}" for name in names] + ["end_header", ""]
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
         file.write("\n".join(lines).encode())

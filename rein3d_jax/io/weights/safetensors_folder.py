@@ -5,7 +5,7 @@ leaf[index] = tensor.transpose(axes).reshape(its shape). Only safetensors are re
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Protocol
@@ -13,16 +13,14 @@ from typing import Any, Protocol
 import jax
 import jax.numpy as jnp
 import numpy as np
-from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import atomic_path, write_text
-from rein3d_jax.io.files.input_file import require_file
 from rein3d_jax.io.files.json_file import path_within, read_json
+from rein3d_jax.io.weights.tensor_file import FLOAT_8, FLOATS, SCALED_MARK, TensorFile, companions, scale_names
 
 _STEM = "diffusion_pytorch_model"  # the file name of both layouts
-_FLOATS = {"F64", "F32", "F16", "BF16"}
 _SHARD = 4 * 2**30  # bytes
 _NAMED = 10  # faults that an error names; the others it counts
 
@@ -37,24 +35,33 @@ class Row(Protocol):
     axes: tuple[int, ...]
 
 
+Changes = Mapping[str, Callable[[], np.ndarray]]  # by tensor, what is added to it, of its shape
+
+
 def tensor_names(folder: str | Path) -> frozenset[str]:
     """All tensors of `folder`. Raises InputError if it holds no readable safetensors files."""
     with _opened(Path(folder)) as tensors:
         return frozenset(tensors)
 
 
-def load_params(folder: str | Path, rows: Sequence[Row], like: Any) -> Any:
+def require_tensors(folder: str | Path, rows: Sequence[Row]) -> None:
+    """Raises InputError as `load_params` does, without reading more than the files' headers."""
+    with _opened(Path(folder)) as tensors:
+        _check_fit(folder, rows, tensors)
+
+
+def load_params(folder: str | Path, rows: Sequence[Row], like: Any, *, changes: Changes | None = None) -> Any:
     """The parameters `like` (nested dicts of jax.ShapeDtypeStruct) filled from `folder`, cast to its types.
 
     Each tensor is accounted for: InputError names those that lack, that no row knows, that have another shape or are
     no floats. On the host there is never more than one leaf.
     """
-    folder = Path(folder)
+    folder, changes = Path(folder), changes or {}
     with _opened(folder) as tensors:
         _check_fit(folder, rows, tensors)
         table = _by_leaf(rows)
         return jax.tree_util.tree_map_with_path(
-            lambda path, leaf: jnp.asarray(_read_leaf(folder, tensors, table[_keys(path)], leaf)), like
+            lambda path, leaf: jnp.asarray(_read_leaf(tensors, table[_keys(path)], leaf, changes)), like
         )
 
 
@@ -80,14 +87,17 @@ def save_params(folder: str | Path, rows: Sequence[Row], params: Any, *, shard: 
 
 
 @contextmanager
-def _opened(folder: Path) -> Iterator[Mapping[str, Any]]:
+def _opened(folder: Path) -> Iterator[Mapping[str, TensorFile]]:
     """Name -> the open file that holds the tensor."""
     with ExitStack() as stack:
-        yield {name: file for path in _files(folder) for file in [_open(stack, path)] for name in _names(file)}
-
-
-def _names(file) -> Iterable[str]:
-    return file.keys()
+        tensors: dict[str, TensorFile] = {}
+        for file in [TensorFile(stack, path) for path in _files(folder)]:
+            for name in file.names:
+                if name in tensors:
+                    both = f"{tensors[name].path.name} and {file.path.name}"
+                    raise InputError(f"{folder}: {both} both hold {name}: leave one model in the folder")
+                tensors[name] = file
+        yield tensors
 
 
 def _files(folder: Path) -> list[Path]:
@@ -109,41 +119,56 @@ def _files(folder: Path) -> list[Path]:
     return [path_within(folder, name, named_by=indices[0]) for name in sorted(set(weight_map.values()))]
 
 
-def _open(stack: ExitStack, path: Path):
-    require_file(path)
-    try:
-        return stack.enter_context(safe_open(path, framework="numpy"))
-    except (SafetensorError, OSError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"{path} is damaged or no safetensors file ({reason}): copy it again") from error
-
-
 def _check_fit(folder, rows, tensors):
-    names = {row.name for row in rows}
-    faults = [f"lacks {row.name} {row.shape}" for row in rows if row.name not in tensors]
-    faults += [f"has {name}, which is unknown" for name in sorted(tensors.keys() - names)]
+    known = {row.name for row in rows}
     for row in rows:
-        if row.name in tensors:
-            view = tensors[row.name].get_slice(row.name)
-            if tuple(view.get_shape()) != row.shape:
-                faults.append(f"has {row.name} {tuple(view.get_shape())}, not {row.shape}")
-            elif view.get_dtype() not in _FLOATS:
-                faults.append(f"has {row.name} as {view.get_dtype()}, not one of {', '.join(sorted(_FLOATS))}")
+        if row.name in tensors and tensors[row.name].kind(row.name) in FLOAT_8:
+            known |= {SCALED_MARK, *companions(row.name)}
+    faults = [f"lacks {row.name} {row.shape}" for row in rows if row.name not in tensors]
+    faults += [f"has {name}, which is unknown" for name in sorted(tensors.keys() - known)]
+    faults += [fault for row in rows if row.name in tensors for fault in _row_faults(row, tensors)]
     if faults:
         more = f"; and {len(faults) - _NAMED} more" if len(faults) > _NAMED else ""
         raise InputError(f"{folder} {'; '.join(faults[:_NAMED])}{more}: choose the sizes that it was made for")
 
 
-def _read_leaf(folder, tensors, rows, leaf):
+def _row_faults(row, tensors) -> Iterator[str]:
+    shape, kind = tensors[row.name].shape(row.name), tensors[row.name].kind(row.name)
+    if shape != row.shape:
+        yield f"has {row.name} {shape}, not {row.shape}"
+    elif kind not in FLOATS:
+        yield f"has {row.name} as {kind}, not one of {', '.join(FLOATS)}"
+    elif kind in FLOAT_8:
+        scale = _scale_name(row, tensors)
+        if scale is None and SCALED_MARK in tensors:
+            yield f"lacks {scale_names(row.name)[0]}, though it has {SCALED_MARK}"
+        elif scale and np.prod(sized := tensors[scale].shape(scale)) not in (1, row.shape[0]):
+            yield f"has {scale} {sized}, neither one number nor one a row"
+
+
+def _scale_name(row, tensors) -> str | None:
+    return next((name for name in scale_names(row.name) if name in tensors), None)
+
+
+def _read_leaf(tensors, rows, leaf, changes):
     out = np.empty(leaf.shape, leaf.dtype)
     for row in rows:
-        try:
-            tensor = tensors[row.name].get_tensor(row.name)
-        except (SafetensorError, OSError) as error:
-            raise InputError(f"{folder}: {row.name} cannot be read ({error}): copy the files again") from error
+        tensor = _unscaled(row, tensors)
+        if row.name in changes:
+            tensor = tensor.astype(np.float32) + changes[row.name]()
         place = out if row.index is None else out[row.index]
         place[...] = tensor.transpose(row.axes).reshape(place.shape)
     return out
+
+
+def _unscaled(row, tensors) -> np.ndarray:
+    """The tensor's own numbers: 8-bit floats in float32, times their scale."""
+    tensor, file = tensors[row.name].read(row.name), tensors[row.name]
+    if file.kind(row.name) not in FLOAT_8:
+        return tensor
+    scale = _scale_name(row, tensors)
+    factor = np.float32(1) if scale is None else tensors[scale].read(scale).astype(np.float32)
+    return tensor.astype(np.float32) * np.reshape(factor, (-1,) + (1,) * (tensor.ndim - 1))
 
 
 def _tensor(row, leaf):

@@ -174,7 +174,7 @@ def test_spz_of_version_1(tmp_path):
         ("sog", b"PK\3\4" + bytes(100), r"is a .sog scene, .* convert it to .ply, with"),
         ("SOG", b"", r"is a .sog scene"),
         ("lcc", b"", r"is a .lcc scene"),
-        ("spz", b"NGSP" + struct.pack("<I", 4) + bytes(24) + b"\x28\xb5\x2f\xfd" + bytes(200), "version 4, .* convert"),
+        ("spz", b"NGSP" + struct.pack("<I", 5) + bytes(200), "version 5, .* convert"),
         ("spz", gzip.decompress(spz_1()), "version 1, unpacked: pack it with gzip"),
         ("spz", spz_1()[:-10], "declares 2 Gaussians and holds less"),
         ("ply", ply(before="face", lists=True), HIDES.format("face")),

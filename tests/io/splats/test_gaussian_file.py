@@ -21,7 +21,7 @@ import pytest
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.spherical_harmonics import C0, basis
-from rein3d_jax.io.splats import spz
+from rein3d_jax.io.splats import spz, spz_streams
 from rein3d_jax.io.splats.gaussian_columns import alive_columns
 from rein3d_jax.io.splats.gaussian_file import read_splats, write_splats
 from rein3d_jax.scene import Gaussians
@@ -75,9 +75,9 @@ def angle_between(a, b):
 TINY = 1e-5  # float32 arithmetic
 BOUNDS = {
     "ply": (0, 0, 1e-3, 0, 0),  # the angle of two quaternions equal to 1e-7: arccos near 1 squares it
-    # 1/2 of 1/4096 m; 1/2 of 1/16; u8 x y z, and w >= 1/2 amplifies by 1/w; 1/2 of 1/(255 * 0.15); half of 16/128, or
-    # all of 15/128 at the top: 255 stands for 256
-    "spz": (0.5 / 4096, 0.5 / 16, 2 * 2 * np.sqrt(3) * 0.5 / 127.5, HALF_BYTE / 0.15, 8 / 128),
+    # 1/2 of 1/4096 m; 1/2 of 1/16; three of 9 bits in [0, 1] / sqrt(2), the fourth >= 1/2 amplifies by 1/w; 1/2 of
+    # 1/(255 * 0.15); half of 16/128, or all of 15/128 at the top: 255 stands for 256
+    "spz": (0.5 / 4096, 0.5 / 16, 2 * 2 * np.sqrt(3) * 0.5 * np.sqrt(0.5) / 511, HALF_BYTE / 0.15, 8 / 128),
     # floats; u8 w x y z in steps of 1/128, where 1 is held as 127/128; colour in [0, 1]
     "splat": (0, 0, 2 * np.sqrt(4) / 128, HALF_BYTE / C0, None),
     # 10 bits of a chunk as wide as the scene (6 m; 8 in log scale; 3.4 in colour coefficients) at most; three of 10
@@ -107,7 +107,7 @@ def test_the_antialias_flag_changes_nothing_else(tmp_path, suffix):
     for a, b in zip(*(jax.tree.leaves(read_splats(path)) for path in (plain, flagged)), strict=True):
         np.testing.assert_array_equal(a, b)
     if suffix == "ply":
-        assert plyfile.PlyData.read(flagged).comments == ["antialiased (Mip-Splatting, eq. 9)"]
+        assert plyfile.PlyData.read(flagged).comments == ["Z up, metres, right-handed", "SplatRenderMode: mip"]
     elif suffix == "spz":
         flags = [gzip.decompress(path.read_bytes())[14] for path in (plain, flagged)]
         assert flags == [0, 1]  # the reference's FlagAntialiased
@@ -272,8 +272,9 @@ def test_bad_spz(tmp_path):
     refused(path, whole[:-9], "declares 9 Gaussians and holds less")
     refused(path, whole[:-1], "declares 9 Gaussians and holds less")  # the checksum is cut
     refused(path, whole[:60] + b"\xff" * 9 + whole[69:], "damaged")
-    refused(path, changed(4, "<I", 4), "SPZ version 4, .*: export it as version 2 or 3")
-    refused(path, changed(12, "<B", 4), "SH degree 4")
+    refused(path, changed(4, "<I", 5), "SPZ version 5, .*: export it as version 3")
+    refused(path, changed(12, "<B", 5), "SH degree 5")
+    refused(path, changed(12, "<B", 4), "declares 9 Gaussians and holds less")
     refused(path, changed(13, "<B", 40), "40 fractional bits")
     refused(path, changed(8, "<I", 8), "declares 8 Gaussians and holds more")
     refused(path, changed(8, "<I", 10), "declares 10 Gaussians and holds less")
@@ -285,7 +286,7 @@ def test_an_spz_bomb_is_not_unpacked(tmp_path, monkeypatch):
     header = struct.pack("<4sIIBBBB", b"NGSP", 2, 5, 0, 12, 0, 0)
     bomb = gzip.compress(header + bytes(64 * 2**20), 9)
     asked = []
-    create = spz.zlib.decompressobj
+    create = spz_streams.zlib.decompressobj
 
     class Counting:
         def __init__(self, wbits):
@@ -299,7 +300,7 @@ def test_an_spz_bomb_is_not_unpacked(tmp_path, monkeypatch):
             asked.append(len(found))
             return found
 
-    monkeypatch.setattr(spz.zlib, "decompressobj", Counting)
+    monkeypatch.setattr(spz_streams.zlib, "decompressobj", Counting)
     refused(tmp_path / "x.spz", bomb, "declares 5 Gaussians and holds more")
     assert sum(asked) <= 16 + 5 * 19 + 2
 
