@@ -145,6 +145,7 @@ def _circumstances(options, config: ReconstructConfig, rooms: list[RoomSource]) 
         "config": recipe_of(config),
         "rooms": [room.name for room in rooms],
         "seeds": {"seed": config.seed},
+        "clip_features": (ALEXNET if options.i3d is None else I3D).label,
         "versions": {
             "python": platform.python_version(),
             **{name: importlib.metadata.version(name) for name in PACKAGES},
@@ -176,6 +177,7 @@ _NOTES = {
     "camera's distance from the input. hole: alpha of the lifted scene below restore.observed. In novel_views the true "
     "distance tells observed, disoccluded and never_seen; a restored clip has none: see protocols.restoration",
     "holes": "where a method shows nothing stands the input's mean colour, in all methods alike",
+    "frechet": "one distance of all rooms' clips, by the features that clip_features names; only I3D's make it an FVD",
     "psnr": "at most 100 dB, since JSON has no infinity",
 }
 

@@ -15,6 +15,7 @@ from experiments.evaluate.mesh_warp import mesh_warp
 from experiments.evaluate.methods import COARSE, MESH, OF_CLIPS, OF_SCENES, Built, build, fill_of
 from experiments.evaluate.renderer import Rendering, first_of_each_kind
 from experiments.evaluate.room import EvaluationRoom, timed, whole
+from rein3d_jax.errors import InputError
 from rein3d_jax.evaluate.clip_features import ClipFeatures
 from rein3d_jax.evaluate.coverage import coverage
 from rein3d_jax.evaluate.flicker import flicker
@@ -55,7 +56,9 @@ def restoration(method: str, room: EvaluationRoom, tools: Tools) -> Outcome:
     """Figures of the room's video, restored from what its first frame, lifted, shows along the path. The first frame
     itself has no holes and does not count. The videos have no true distance: what the lifted frame leaves open counts
     as disoccluded, what it shows at a completed distance as never seen, the rest as observed."""
-    truth = room.clip_rgb
+    truth, needed = room.clip_rgb, tools.features.frames
+    if len(truth) < needed:
+        raise InputError(f"{room.name}: {tools.features.label} needs clips of {needed} frames, not {len(truth)}")
     (degraded, _), (shown, seconds) = room.degraded, _clip(method, room)
     hole = degraded.alpha < room.config.restore.observed
     masks = {name: mask[1:] for name, mask in _masks(_clip_regions(room, hole), hole).items()}

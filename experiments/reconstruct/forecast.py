@@ -16,6 +16,7 @@ import jax
 import numpy as np
 
 from experiments.reconstruct.config import ReconstructConfig
+from experiments.reconstruct.diffusion_cost import restore_seconds
 from experiments.reconstruct.inputs import InputConfig
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
@@ -27,7 +28,7 @@ _COMPILED = dict(zip(COUNTED, (18.0, 17.0, 0.7, 38.0, 7.0, 2.0, 18.0), strict=Tr
 _KEPT = dict(zip(COUNTED, (2.0, 2.2, 0.1, 4.5, 1.0, 0.5, 2.5), strict=True))
 _NETWORK = 2.4  # seconds for the depth network
 _CALIBRATED = 0.072  # seconds that `_calibration` takes on the model's machine
-_FRAMES = 12  # of a path, on average
+_WAY = 6.0  # metres of a path, on average
 
 
 class SecondsForecast:
@@ -76,6 +77,8 @@ def _work(config: ReconstructConfig, rows: int, *, upsampled: bool) -> dict[str,
     pixels, restored = (2 * r * r / 1e6 for r in (rows, config.restore.height))  # million
     paths, every = config.explore.trajectories, config.explore.min_revealed == 0
     made_finer = 31 * pixels if config.input.upsample == LEARNED and upsampled else 0.0
+    frames = min(_WAY / config.explore.step, config.explore.max_frames)
+    by_network = restore_seconds(config, frames)
     views, film = 24 if config.input.views else 0, config.film.width * config.film.height / 1e6
     size = 0.02 + 0.16 * config.lift.share * pixels  # to render a small picture of the scene
     step = 0.03 + 4 * config.refine.views.size**2 / 1e6
@@ -84,9 +87,9 @@ def _work(config: ReconstructConfig, rows: int, *, upsampled: bool) -> dict[str,
         "lift": 0.3 + 1.0 * pixels,
         "explore": 0.1,
         "peel": 0.3 + 4 * restored if config.peel.room else 0.2,
-        "restore": paths * (0.1 + size + restored + every * _FRAMES * (size + 4 * restored)),
+        "restore": paths * (0.1 + size + restored + every * frames * (size + 4 * restored)) + by_network,
         "refine": 0.3 + every * config.refine.steps * config.refine.batch * step,
-        "write": 2.0 + (20 + _FRAMES * paths) * (size + 0.1 * film) + 2 * views * size,
+        "write": 2.0 + (20 + frames * paths) * (size + 0.1 * film) + 2 * views * size,
     }
 
 

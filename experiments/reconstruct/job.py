@@ -1,5 +1,6 @@
 """The main job on files: reads, runs the stages, saves each when it is done, writes what a person opens."""
 
+import contextlib
 import dataclasses
 import importlib.metadata
 import sys
@@ -14,6 +15,7 @@ from experiments.config import dump_config
 from experiments.machine import machine_bytes
 from experiments.reconstruct.budget import OUT_OF_TIME, Clock, check_memory, foreseen_bytes, within
 from experiments.reconstruct.config import ReconstructConfig
+from experiments.reconstruct.diffusion_cost import told_cost
 from experiments.reconstruct.forecast import SecondsForecast
 from experiments.reconstruct.inputs import input_fingerprint, input_views, levelled_views, told_panorama, working_rows
 from experiments.reconstruct.outputs import write_outputs
@@ -26,7 +28,7 @@ from rein3d_jax.explore.trajectories import radial_trajectories
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.lift import LiftConfig
 from rein3d_jax.networks.depth import SHIPPED_DEPTH, read_depth_network
-from rein3d_jax.networks.trained import files_digest, read_network, weights_fingerprint
+from rein3d_jax.networks.trained import files_digest, read_network, require_network, weights_fingerprint
 from rein3d_jax.networks.upsampler import read_upsampler, upsampler_fingerprint
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
 from rein3d_jax.pipeline.peel_scene import peel_scene
@@ -73,7 +75,8 @@ class _Job:
 def run_job(config: ReconstructConfig, *, resume: bool = False) -> dict:
     """Run the job; returns what metrics.json holds. Raises InputError for whatever is wrong with the input."""
     clock, output = Clock(config.budget), Path(config.output)
-    views = input_views(config.input)  # a bad view is found before the long part
+    views = input_views(config.input)  # a bad view is found before the long part, and so are bad weights
+    require_network(config.restore)
     rows = working_rows(config.input)
     check_memory(rows, machine_bytes())
     files = input_fingerprint(config.input)
@@ -82,6 +85,7 @@ def run_job(config: ReconstructConfig, *, resume: bool = False) -> dict:
     write_text(output / "config.toml", _header() + dump_config(config))
     config = within(config, config.budget)
     with Progress(config, **foreseen) as progress:
+        progress.tell(told_cost(config))
         store = StageStore(output / "stages", config.refine, resume=resume)
         job = _Job(config, store, progress, clock)
         *made, lean = _stages(job, files)
@@ -93,8 +97,15 @@ def run_job(config: ReconstructConfig, *, resume: bool = False) -> dict:
 
 
 def _header() -> str:
-    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in PACKAGES)
+    versions = ", ".join(_versions())
     return f"# written by rein3d_jax; Python {sys.version.split()[0]}, {versions}; jax on {jax.default_backend()}\n"
+
+
+def _versions():
+    """Of the packages that are installed: a checkout may run uninstalled, and one OpenCV may stand for another."""
+    for name in PACKAGES:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            yield f"{name} {importlib.metadata.version(name)}"
 
 
 def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str, Lean]:

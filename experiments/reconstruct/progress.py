@@ -40,6 +40,11 @@ class Progress:
         self.passed += self.seconds[kind] / (self.paths if kind == "restore" else 1)
         self.bars.update(self.task, completed=self.passed, description=f"after {stage.name}")
 
+    def tell(self, line: str) -> None:
+        """What else is foreseen; nothing for ""."""
+        if line:
+            self.console.print(line)
+
     def look(self, output: Path) -> None:
         """There is something to see; told once."""
         if not self.looked:

@@ -7,7 +7,7 @@ import jax
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.weights.restorer_weights import SHIPPED_RESTORER, read_restorer
-from rein3d_jax.networks.wan import read_wan
+from rein3d_jax.networks.wan import read_wan, require_wan
 from rein3d_jax.restore.learned.config import NetworkConfig
 from rein3d_jax.restore.learned.network import initial_parameters
 from rein3d_jax.restore.learned.sample import Learned
@@ -21,16 +21,25 @@ def read_network(config: RestoreConfig) -> TrainedNetwork | None:
         return _learned(config)
     if config.method != DIFFUSION:
         return None
-    if config.weights is None:
-        raise InputError("restore.weights is missing: give the folder of Wan2.1-VACE's weights (networks/wan.py)")
-    return read_wan(config.weights, config.diffusion.network)
+    diffusion = config.diffusion
+    return read_wan(_folder(config), diffusion.network, words=diffusion.sample.words, lora=diffusion.lora)
+
+
+def require_network(config: RestoreConfig) -> None:
+    """Raises InputError as `read_network` does, without reading what is large."""
+    if config.method == LEARNED:
+        _learned(config)
+    elif config.method == DIFFUSION:
+        diffusion = config.diffusion
+        require_wan(_folder(config), diffusion.network, words=diffusion.sample.words, lora=diffusion.lora)
 
 
 def weights_fingerprint(config: RestoreConfig) -> str:
     """Hash of the weights' files: a resumed job must not mix two networks. Empty for the fills."""
-    if config.method not in (LEARNED, DIFFUSION):
-        return ""
-    return files_digest(Path(config.weights or SHIPPED_RESTORER))
+    if config.method == DIFFUSION:
+        lora = config.diffusion.lora.file
+        return files_digest(_folder(config)) + ("" if lora is None else files_digest(Path(lora)))
+    return files_digest(Path(config.weights or SHIPPED_RESTORER)) if config.method == LEARNED else ""
 
 
 def files_digest(path: Path) -> str:
@@ -42,6 +51,17 @@ def files_digest(path: Path) -> str:
         with open(file, "rb") as content:
             digest.update(hashlib.file_digest(content, "sha256").digest())
     return digest.hexdigest()
+
+
+def _folder(config: RestoreConfig) -> Path:
+    """Of the diffusion network's weights."""
+    if config.weights is None or not Path(config.weights).is_dir():
+        missing = "is missing" if config.weights is None else f"{config.weights} is no folder"
+        raise InputError(
+            f"restore.weights {missing}: train one (python -m experiments.train_restore --config paper_train), or give "
+            "a folder of Wan2.1-VACE-1.3B's weights (experiments/README.md, Weights, says where they are had)"
+        )
+    return Path(config.weights)
 
 
 def _learned(config: RestoreConfig) -> Learned:

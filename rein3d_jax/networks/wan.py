@@ -4,9 +4,11 @@
     vae/            the same of the VAE
     text/           one safetensors file: `text` and `no_text`, embedded prompts (512, text_dim), zeros after their ends
 
-A text encoder five times the network's size is not worth having for one fixed prompt: embed it once, elsewhere.
+Each is a file or shards with an index, of any float type, 8-bit ones with or without scales. A text encoder five times
+the network's size is not worth having for one fixed prompt: embed it once, elsewhere, or go without words.
 """
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +17,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.weights.safetensors_folder import load_params, save_params, tensor_names
+from rein3d_jax.io.weights.lora_file import read_lora_file
+from rein3d_jax.io.weights.safetensors_folder import Changes, load_params, require_tensors, save_params, tensor_names
 from rein3d_jax.restore.wan.config import WanConfig
-from rein3d_jax.restore.wan.names import TensorRow, dit_rows, layout_of, vae_rows
+from rein3d_jax.restore.wan.lora_names import LoraFileConfig, lora_change, lora_parts
+from rein3d_jax.restore.wan.names import LAYOUTS, TensorRow, dit_rows, layout_of, vae_rows
 from rein3d_jax.restore.wan.restore import WanParams
 from rein3d_jax.restore.wan.training.memory import dit_shapes, vae_shapes
 
@@ -25,25 +29,47 @@ _TEXT_LENGTH = 512  # of an embedded prompt: the padding takes part in attention
 _PROMPTS = ("text", "no_text")
 
 
-def read_wan(folder: str | Path, config: WanConfig) -> WanParams:
-    """Parameters from a folder. Raises InputError, naming the folder or tensor, for what is missing, unknown or of
-    another shape."""
+def read_wan(
+    folder: str | Path, config: WanConfig, *, words: bool = True, lora: LoraFileConfig = LoraFileConfig()
+) -> WanParams:
+    """Parameters from a folder, with a LoRA merged in. Raises InputError as `require_wan` does.
+
+    Without words text/ is not read. A single token of zeros then stands for the prompt: attention to any number of
+    equal tokens gives the same.
+    """
     folder = Path(folder)
-    for name in ("transformer", "vae", "text"):
-        if not (folder / name).is_dir():
-            raise InputError(f"{folder} has no folder {name}: it needs transformer, vae and text (networks/wan.py)")
-    text = _text_shapes(config)
+    _require_folders(folder, words)
+    tables = _tables(folder, config)
+    text = _text_shapes(config) if words else {}
+    none = jnp.zeros((1, config.dit.text_dim))
+    texts = load_params(folder / "text", _text_rows(text), text) if words else dict.fromkeys(_PROMPTS, none)
+    changes = _changes(lora, tables["transformer"], config)
     return WanParams(
-        dit=_read(folder / "transformer", dit_rows, dit_shapes(config.dit), config.dit),
-        vae=_read(folder / "vae", vae_rows, vae_shapes(config.vae), config.vae),
-        **load_params(folder / "text", _text_rows(text), text),
+        dit=load_params(folder / "transformer", tables["transformer"], dit_shapes(config.dit), changes=changes),
+        vae=load_params(folder / "vae", tables["vae"], vae_shapes(config.vae)),
+        **texts,
     )
 
 
-def write_wan(folder: str | Path, params: WanParams, config: WanConfig) -> None:
-    """Writes what `read_wan` reads, in the names of diffusers."""
+def require_wan(
+    folder: str | Path, config: WanConfig, *, words: bool = True, lora: LoraFileConfig = LoraFileConfig()
+) -> None:
+    """Raises InputError, naming the folder or tensor, for what is missing, unknown or of another shape. Of the network
+    only headers are read."""
     folder = Path(folder)
-    dit, vae = dit_rows(params.dit, config.dit, "diffusers"), vae_rows(params.vae, config.vae, "diffusers")
+    _require_folders(folder, words)
+    tables = _tables(folder, config)
+    if words:
+        tables["text"] = _text_rows(_text_shapes(config))
+    for name, rows in tables.items():
+        require_tensors(folder / name, rows)
+    _changes(lora, tables["transformer"], config)
+
+
+def write_wan(folder: str | Path, params: WanParams, config: WanConfig, *, layout: str = "diffusers") -> None:
+    """Writes what `read_wan` reads, in the names of `layout`."""
+    folder = Path(folder)
+    dit, vae = dit_rows(params.dit, config.dit, layout), vae_rows(params.vae, config.vae, layout)
     texts = {name: getattr(params, name) for name in _PROMPTS}
     for name, rows, part in (("vae", vae, params.vae), ("text", _text_rows(texts), texts)):
         save_params(folder / name, rows, part)
@@ -69,7 +95,7 @@ def _drawn(random: np.random.Generator, shapes: Any) -> Any:
         if last == "bias" or name in ("hint", "control_in"):
             return jnp.zeros(leaf.shape, leaf.dtype)
         fan = leaf.shape[-1] if last == "modulation" else np.prod(leaf.shape[:-1]) // _stacked(path, leaf)
-        return jnp.asarray(random.normal(size=leaf.shape) * fan**-0.5, leaf.dtype)
+        return jnp.asarray(random.standard_normal(leaf.shape, np.float32) * np.float32(fan**-0.5), leaf.dtype)
 
     return jax.tree_util.tree_map_with_path(draw, shapes)
 
@@ -79,8 +105,32 @@ def _stacked(path, leaf) -> int:
     return leaf.shape[0] if path[0].key == "steps" else 1
 
 
-def _read(folder: Path, rows_of, shapes: Any, config: Any) -> Any:
-    return load_params(folder, rows_of(shapes, config, layout_of(tensor_names(folder))), shapes)
+def _require_folders(folder: Path, words: bool) -> None:
+    needed = ("transformer", "vae", "text") if words else ("transformer", "vae")
+    for name in needed:
+        if not (folder / name).is_dir():
+            raise InputError(
+                f"{folder} has no folder {name}: it needs {', '.join(needed)} (experiments/README.md, Weights)"
+            )
+
+
+def _tables(folder: Path, config: WanConfig) -> dict[str, tuple[TensorRow, ...]]:
+    """The network's rows under the names that its files have."""
+    parts = {"transformer": (dit_rows, dit_shapes(config.dit), config.dit)}
+    parts["vae"] = (vae_rows, vae_shapes(config.vae), config.vae)
+    return {name: rows(*of, layout_of(tensor_names(folder / name))) for name, (rows, *of) in parts.items()}
+
+
+def _changes(lora: LoraFileConfig, base: tuple[TensorRow, ...], config: WanConfig) -> Changes:
+    if lora.file is None:
+        return {}
+    layouts = [dit_rows(dit_shapes(config.dit), config.dit, layout) for layout in LAYOUTS]
+    try:
+        parts = lora_parts(read_lora_file(lora.file), base, layouts)
+    except InputError as error:
+        raise InputError(f"restore.diffusion.lora.file: {lora.file} {error}") from error
+    shapes = {row.name: row.shape for row in base}
+    return {name: partial(lora_change, of, shapes[name], lora.scale) for name, of in parts.items()}
 
 
 def _text_shapes(config: WanConfig) -> dict[str, jax.ShapeDtypeStruct]:

@@ -1,4 +1,4 @@
-"""Refinement with each step's views shared out over devices."""
+"""Refinement with each step's views shared out over devices, of one process or of several that take the same steps."""
 
 from collections.abc import Callable
 from functools import cache
@@ -14,7 +14,8 @@ from rein3d_jax.refine.step import batch_sums, update
 
 def steps_over(mesh: Mesh) -> Callable:
     """`refine`'s `take_step` with each batch shared out over the mesh by pmap, so that a device renders its own views
-    and only sums travel. It raises InputError where the devices do not divide the batch."""
+    and only sums travel. Each process has all views and the whole state. It raises InputError where the devices do not
+    divide the batch."""
 
     @cache
     def compiled(config, raster, buffers):
@@ -29,8 +30,14 @@ def steps_over(mesh: Mesh) -> Callable:
     def take_step(state, views, chance, *, config, raster, buffers):
         if config.batch % mesh.size:
             raise InputError(f"refine.batch {config.batch} is not divided by {mesh.size} devices; make it a multiple")
-        chosen = jax.tree.map(lambda x: np.asarray(x)[np.asarray(chance.batch)], views)
+        mine = np.split(np.asarray(chance.batch), jax.process_count())[jax.process_index()]
+        chosen = jax.tree.map(lambda x: np.asarray(x)[mine], views)
         (state, _), metrics = compiled(config, raster, buffers)((state, chance), chosen)
-        return state, metrics
+        return jax.tree.map(_here, (state, metrics))
 
     return take_step
+
+
+def _here(array: jax.Array) -> jax.Array:
+    """What all devices have, as an array of this process's own, which its other programs take."""
+    return array if array.is_fully_addressable else array.addressable_data(0)

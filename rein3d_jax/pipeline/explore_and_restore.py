@@ -58,7 +58,7 @@ def _explored(known: Survey, restore: Restorer, key: jax.Array, stages: Stages, 
     else:
         degraded, buffers = render_video(seen, poses, height, config=raster, buffers=buffers)
         video, after = restore(degraded, key), before.replace(buffers=buffers)
-        if stages.restore.method != "none":
+        if stages.restore.method != "none" and stages.restore.fuse_every:
             after = fuse_guesses(after, degraded, video, known.panorama, stages)
     counts = (jnp.asarray(index + 1), revealed, jnp.asarray(after.overflow), jnp.array(after.buffers))
     return Explored(after.scene, video, *counts)

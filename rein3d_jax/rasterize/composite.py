@@ -22,7 +22,7 @@ from rein3d_jax.rasterize.quadratic import axes_entries, coefficients, evaluate_
 from rein3d_jax.rasterize.tile import Chunks
 from rein3d_jax.scene import Camera
 
-_BLOCK = 512  # chunks handled at a time: their carry fits a core's second-level cache
+_BLOCK = 128  # chunks handled at a time: what a step makes fits a core's second-level cache
 _UNROLL = 4  # Gaussians a step of the loop
 _EMPTY = -100.0  # log opacity of a slot without a Gaussian: alpha 0
 
@@ -79,10 +79,10 @@ class _Blocks:
         """As many as the block's first chunk needs, which is its fullest."""
         return -(-self.chunks.fill[index * self.block] // self.unroll)
 
-    def rows(self, table: jax.Array, index, number) -> jax.Array:
-        """Rows (unroll, block, m) of the table for step `number` of the block."""
+    def ids(self, index, number) -> jax.Array:
+        """Splats (unroll, block) of step `number` of the block."""
         place = (number * self.unroll, index * self.block)
-        return table[jax.lax.dynamic_slice(self.chunks.ids, place, (self.unroll, self.block))]
+        return jax.lax.dynamic_slice(self.chunks.ids, place, (self.unroll, self.block))
 
 
 def _chunk_layers(table, anchors, pixels, chunks):
@@ -95,7 +95,7 @@ def _chunk_layers(table, anchors, pixels, chunks):
 
         def step(number, state):
             through, sums = state
-            of_terms, of_values = _unpack(blocks.rows(table, index, number), near)
+            of_terms, of_values = _unpack(table[blocks.ids(index, number)], near)
             for u in range(blocks.unroll):
                 weight = _alpha([c[u] for c in of_terms], planes)[1] * through
                 sums = [s + weight * value[u][:, None] for s, value in zip(sums, of_values, strict=True)]
@@ -170,14 +170,14 @@ def _composite_backward(residuals, gradient):
     rest = _still_to_come(gradient, layers, image, chunks)
     blocks, ones = _Blocks(chunks, anchors, pixels), jnp.ones(pixels.shape[2], table.dtype)
 
-    def reverse_block(index, of_all):
+    def reverse_block(index, of_table):
         near, planes = blocks.by_tile(anchors, index), blocks.planes(index)
         pull = list(jnp.moveaxis(blocks.by_tile(gradient, index), 1, 0))
 
         def step(number, state):
-            through, rest, of_slots = state
-            rows = blocks.rows(table, index, number)
-            (of_terms, of_values), chain = jax.vjp(lambda x: _unpack(x, near), rows)
+            through, rest, of_table = state
+            ids = blocks.ids(index, number)
+            (of_terms, of_values), chain = jax.vjp(lambda x: _unpack(x, near), table[ids])
             powers, weights = [], []
             for u in range(blocks.unroll):
                 raw, alpha = _alpha([c[u] for c in of_terms], planes)
@@ -192,18 +192,15 @@ def _composite_backward(residuals, gradient):
             weights = jnp.stack(weights)
             sums = [jnp.matmul(weights * g, ones, precision="highest") for g in pull[:-1]]
             (of_rows,) = chain((_moments(jnp.stack(powers), planes), sums))
-            place = (number * blocks.unroll, index * blocks.block, 0)
-            of_slots = jax.lax.dynamic_update_slice(of_slots, of_rows, place)
-            return through, rest, of_slots
+            # One row after the other on a CPU: the same bytes every time. A GPU adds them atomically unless XLA_FLAGS
+            # has --xla_gpu_deterministic_ops=true.
+            return through, rest, of_table.at[ids].add(of_rows)
 
-        start = (blocks.part(before, index), blocks.part(rest, index), of_all)
+        start = (blocks.part(before, index), blocks.part(rest, index), of_table)
         return jax.lax.fori_loop(0, blocks.steps(index), step, start)[2]
 
-    start = jnp.zeros((*chunks.ids.shape, table.shape[1]), table.dtype)
-    of_slots = jax.lax.fori_loop(0, blocks.count, reverse_block, start)
-    # Rows are added in the order of the slots, one after the other on a CPU: the same bytes every time. A GPU adds
-    # them atomically unless XLA_FLAGS has --xla_gpu_deterministic_ops=true.
-    return jnp.zeros_like(table).at[chunks.ids].add(of_slots), None, None, None
+    of_table = jax.lax.fori_loop(0, blocks.count, reverse_block, jnp.zeros_like(table))
+    return of_table, None, None, None
 
 
 composite.defvjp(_composite_forward, _composite_backward)

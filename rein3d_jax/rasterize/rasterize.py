@@ -14,7 +14,6 @@ frame = rasterize(scene, camera, config=config, buffers=buffers)  # jit, grad, v
 assert frame.rgb.shape == (64, 128, 3) and frame.overflow == 0
 """
 
-import math
 from collections.abc import Sequence
 
 import jax
@@ -29,9 +28,9 @@ from rein3d_jax.rasterize.composite import composite_chunks
 from rein3d_jax.rasterize.config import RasterizeConfig
 from rein3d_jax.rasterize.cull import at_least_one, in_view
 from rein3d_jax.rasterize.listing import list_splats
-from rein3d_jax.rasterize.pixels import from_tiles, grid
+from rein3d_jax.rasterize.pixels import from_tiles
 from rein3d_jax.rasterize.project import Splats, project
-from rein3d_jax.rasterize.tile import needed_pairs
+from rein3d_jax.rasterize.tile import needed_lists
 from rein3d_jax.scene import Camera, Gaussians
 
 
@@ -88,8 +87,8 @@ tile does not divide a panorama's width. Deterministic: the same inputs give the
 def _measure(gaussians, camera, *, config):
     gaussians = at_least_one(gaussians)
     mask = in_view(gaussians, camera, config=config)
-    pairs = needed_pairs(project(gaussians, camera, config=config), camera, config=config)
-    return jnp.concatenate([jnp.sum(mask)[None], pairs])
+    lists = needed_lists(project(gaussians, camera, config=config), camera, config=config)
+    return jnp.concatenate([jnp.sum(mask)[None], lists])
 
 
 _measure = jax.jit(_measure, static_argnames=("config",))
@@ -103,10 +102,7 @@ def allocate(
     Runs outside jit. An all-new camera may still overflow: `Frame.overflow` tells.
     """
     measured = jnp.stack([_measure(gaussians, camera, config=config) for camera in cameras]).max(axis=0)
-    visible, rows, pairs = (int(x * slack) for x in measured)
-    # Each tile wastes less than one chunk, so this bound holds whatever the spread over tiles.
-    chunks = pairs // config.chunk + math.prod(grid(cameras[0], config.tile))
-    return Buffers(*map(bucket, (visible, rows, pairs, chunks)))
+    return Buffers(*(bucket(int(x * slack)) for x in measured))
 
 
 def render(

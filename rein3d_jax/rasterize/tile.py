@@ -54,20 +54,27 @@ def _expand(counts: jax.Array, capacity: int) -> tuple[jax.Array, jax.Array, jax
     return owner, rank, rank < counts[owner]
 
 
-def needed_pairs(splats: Splats, camera: Camera, *, config: RasterizeConfig) -> jax.Array:
-    """The numbers (2,) of (splat, row of tiles) and (splat, tile) pairs: what `allocate` measures, without a buffer."""
+def needed_lists(splats: Splats, camera: Camera, *, config: RasterizeConfig) -> jax.Array:
+    """The numbers (3,) of (splat, row of tiles) pairs, of (splat, tile) pairs and of chunks: what `allocate` measures.
+    No list is made."""
     first, count = tile_rows(splats, camera, config=config)
-    ends, rows = jnp.cumsum(count), jnp.sum(count)
+    ends, total = jnp.cumsum(count), jnp.sum(count)
+    rows, columns = grid(camera, config.tile)
 
-    def add_block(number, total):
+    def add_block(number, edges):
         """Rows of tiles by the thousand: most splats have one or two of them, and a few have all."""
         nth = number * _MEASURED + jnp.arange(_MEASURED)
         owner = jnp.minimum(jnp.searchsorted(ends, nth, side="right"), count.size - 1)
         row = first[owner] + nth - (ends - count)[owner]
-        _, columns = tile_columns(splats, owner, row, camera, config=config)
-        return total + jnp.sum(jnp.where(nth < rows, columns, 0))
+        start, across = tile_columns(splats, owner, row, camera, config=config)
+        start, used = start % columns, (nth < total).astype(jnp.int32)  # a panorama's may begin left of the seam
+        return edges.at[row, start].add(used, mode="drop").at[row, start + across].add(-used, mode="drop")
 
-    return jnp.stack([rows, jax.lax.fori_loop(0, -(-rows // _MEASURED), add_block, jnp.int32(0))])
+    # Where a list of splats begins and ends in a row of tiles, which may go round once.
+    edges = jnp.zeros((rows, 2 * columns + 1), jnp.int32)
+    edges = jax.lax.fori_loop(0, -(-total // _MEASURED), add_block, edges)
+    length = jnp.sum(jnp.cumsum(edges, axis=1)[:, :-1].reshape(rows, 2, columns), axis=1)
+    return jnp.stack([total, jnp.sum(length), jnp.sum(-(-length // config.chunk))])
 
 
 def _pairs(splats: Splats, camera: Camera, config: RasterizeConfig, buffers: Buffers):

@@ -35,7 +35,9 @@ class RestoreConfig(Settings):
     method: str = setting("background", "fill of holes, or trained network", among=METHODS)
     weights: str | None = setting(None, "of learned: an NPZ file, none for the packaged one; of diffusion: a folder")
     sequential: bool = setting(True, "later trajectories see what earlier ones restored; false is the paper's order")
-    fuse_every: int = setting(2, "from one frame lifted into the scene to the next", within="[1, inf)", unit="frames")
+    fuse_every: int = setting(
+        2, "from one frame lifted into the scene to the next; 0: none is", within="[0, inf)", unit="frames"
+    )
     height: int = setting(128, "of the restored panoramas, a multiple of 16", within="[32, inf)", unit="rows")
     shell_support: float = setting(0.3, "share on a box, below which holes show no box", within="[0, inf)")
     observed: float = setting(0.5, "alpha from which a pixel counts as observed", within="(0, 1)")

@@ -171,7 +171,7 @@ def test_an_unknown_method_is_refused_by_name() -> None:
     [
         ({"height": 16}, r"height must be in \[32, inf\), not 16"),
         ({"height": 100}, "height must be a multiple of 16, not 100"),
-        ({"fuse_every": 0}, r"fuse_every must be in \[1, inf\), not 0"),
+        ({"fuse_every": -1}, r"fuse_every must be in \[0, inf\), not -1"),
         ({"observed": 1.0}, r"observed must be in \(0, 1\), not 1\.0"),
     ],
 )

@@ -15,6 +15,7 @@ from rein3d_jax.restore.noise import NOISES, draw_noise
 from rein3d_jax.restore.wan.condition import control_latents
 from rein3d_jax.restore.wan.config import WanConfig
 from rein3d_jax.restore.wan.dit import Dit
+from rein3d_jax.restore.wan.lora_names import LoraFileConfig
 from rein3d_jax.restore.wan.sampler import guided, sample_latents
 from rein3d_jax.restore.wan.schedule import sampling_sigmas
 from rein3d_jax.restore.wan.solver import SOLVERS
@@ -33,8 +34,14 @@ class SampleConfig(Settings):
     guidance: float = setting(5.0, "classifier-free; 1: one pass a step, without it", within="(-inf, inf)")
     solver: str = setting("unipc", "of the flow's ODE", among=tuple(SOLVERS))
     noise: str = setting("latitude", "correlated as pixels crowd, white, or the paper's warp", among=tuple(NOISES))
+    words: bool = setting(True, "give the network the prompts of text/; false: none, for which guidance must be 1")
     random_yaw: bool = setting(True, "yaw the panorama at random from step to step, for a RoPE that is not circular")
     windows: WindowConfig = WindowConfig()
+
+    def __post_init__(self):
+        super().__post_init__()
+        if not self.words and self.guidance != 1:
+            raise InputError(f"guidance must be 1 without words, which guide it, not {self.guidance}")
 
 
 @dataclass(frozen=True)
@@ -43,6 +50,7 @@ class DiffusionConfig(Settings):
 
     network: WanConfig = WanConfig()
     sample: SampleConfig = SampleConfig()
+    lora: LoraFileConfig = LoraFileConfig()
 
 
 @struct.dataclass
@@ -51,7 +59,7 @@ class WanParams:
 
     dit: Any
     vae: Any
-    text: jax.Array  # (m, text_dim) embedded prompt, zeros after its end
+    text: jax.Array  # (m, text_dim) embedded prompt, zeros after its end; without words (1, text_dim) zeros
     no_text: jax.Array  # the same for the negative prompt; used if guidance is not 1
 
 

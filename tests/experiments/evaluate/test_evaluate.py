@@ -10,6 +10,8 @@ import pytest
 from experiments.evaluate import __main__ as evaluate
 from experiments.evaluate import protocols
 from experiments.evaluate.room import room_sources
+from rein3d_jax.evaluate.clip_features import I3D
+from rein3d_jax.io.weights import metric_weights
 
 pytestmark = pytest.mark.slow  # whole evaluations
 
@@ -66,6 +68,7 @@ def test_the_main_jobs_scene_is_measured_like_the_others_and_not_made_twice(reci
 def test_layout(finished):
     result = finished[1]
     assert result["rooms"] == ["room2", "room10"] and result["recipe"] == "tiny" and result["seeds"] == {"seed": 0}
+    assert result["clip_features"] == "Frechet distance (AlexNet features)"
     assert result["versions"]["jax"] and result["machine"]["cores"] >= 1 and result["config"]["input"]["height"] == 64
     assert [set(result[name]) for name in protocols.PROTOCOLS] == [set(METHODS.split(","))] * 3
     restored, novel = result["restoration"]["telea"], result["novel_views"]["mesh_warp"]
@@ -223,3 +226,44 @@ def test_nothing_to_do_is_said(capsys):
     assert evaluate.main([]) == 2 and "give --rooms" in capsys.readouterr().err
     assert evaluate.main(["--rooms", "x"]) == 2 and "also needs --json" in capsys.readouterr().err
     assert evaluate.main(["--chart"]) == 2 and "needs result files" in capsys.readouterr().err
+
+
+@pytest.fixture
+def fake_i3d(tmp_path, monkeypatch):
+    """A file that `i3d_weights` takes while its network has a sixteenth of its channels."""
+    read, wanted = metric_weights._read, {}
+
+    def narrow(shapes):
+        if "Logits/Conv3d_0c_1x1.kernel" not in shapes:  # another metric's
+            return shapes
+        return {name: (*x[:-2], *(n // 16 or n for n in x[-2:])) for name, x in shapes.items()}
+
+    monkeypatch.setattr(metric_weights, "_read", lambda path, shapes, mend: wanted.update(narrow(shapes)))
+    metric_weights.i3d_weights(tmp_path)
+    monkeypatch.setattr(metric_weights, "_read", lambda path, shapes, mend: read(path, narrow(shapes), mend))
+    random = np.random.default_rng(0)
+    spread = {name: np.prod(shape[:-1]) ** -0.5 for name, shape in wanted.items()}
+    path = tmp_path / "i3d.npz"
+    np.savez(path, **{name: random.normal(0, spread[name], shape) for name, shape in wanted.items()})
+    return path
+
+
+def with_frames(rooms, folder, count):
+    """The rooms, their videos there and back again until they have so many frames."""
+    shutil.copytree(rooms, folder)
+    for room in folder.iterdir():
+        scene = json.loads((room / "scene.json").read_text())
+        there = scene["video"]
+        scene["video"] = ((there + there[-2:0:-1]) * count)[:count]
+        (room / "scene.json").write_text(json.dumps(scene))
+    return folder
+
+
+def test_the_frechet_distance_by_i3ds_features_is_the_fvd_and_says_so(fake_i3d, recipe, rooms, tmp_path, capsys):
+    chosen = ["--protocol", "restoration", "--methods", "coarse", "--i3d", str(fake_i3d)]
+    code, result = run(recipe, with_frames(rooms, tmp_path / "long", I3D.frames), tmp_path, *chosen)
+    assert code == 0 and result["clip_features"] == "FVD (I3D, Kinetics-400 logits)"
+    found = result["restoration"]["coarse"]
+    assert found["frechet_i3d"]["mean"] >= 0 and found["frechet_i3d"]["clips"] == 2 and "frechet_alexnet" not in found
+    assert run(recipe, rooms, tmp_path, *chosen)[0] == 2
+    assert "needs clips of 9 frames, not 4" in capsys.readouterr().err
