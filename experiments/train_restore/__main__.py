@@ -16,7 +16,7 @@ from experiments.train_restore.learned.train import train_learned
 from experiments.train_restore.wan.config import WanTrainConfig
 from experiments.train_restore.wan.train import train_wan
 from rein3d_jax.errors import InputError
-from rein3d_jax.parallel import join_hosts
+from rein3d_jax.parallel import join_hosts, tethered
 
 MODELS = {"learned": (LearnedTrainConfig, train_learned), "diffusion": (WanTrainConfig, train_wan)}  # as restore.method
 
@@ -39,7 +39,12 @@ def _train(options: argparse.Namespace) -> None:
     kind, train = MODELS[model]
     config = load_config(kind, options.config, options.set)
     join_hosts(options.address, options.processes, options.process)
-    train(config, resume=options.resume)
+    with tethered(options.address, _say):
+        train(config, resume=options.resume)
+
+
+def _say(line: str) -> None:
+    print(f"train_restore: {line}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -52,9 +52,10 @@ def optimizer(config: OptimizerConfig, steps: int) -> optax.GradientTransformati
 
 def first_state(parameters: Any, config: TrainConfig) -> TrainState:
     """State before the first step."""
-    zero, average = jnp.zeros((), jnp.int32), jax.tree.map(jnp.copy, parameters)
+    step, skipped, in_a_row = (jnp.zeros((), jnp.int32) for _ in range(3))  # three buffers: each is donated
+    average = jax.tree.map(jnp.copy, parameters)
     moments = optimizer(config.optimizer, config.steps).init(parameters)
-    return TrainState(zero, parameters, average, moments, jnp.zeros(()), zero, zero)
+    return TrainState(step, parameters, average, moments, jnp.zeros(()), skipped, in_a_row)
 
 
 def guarded_step(

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from rein3d_jax.evaluate.alexnet import alexnet
-from rein3d_jax.evaluate.i3d import SIDE, Params, i3d
+from rein3d_jax.evaluate.i3d import MIN_FRAMES, SIDE, Params, i3d
 
 
 class ClipFeatures(NamedTuple):
@@ -15,6 +15,7 @@ class ClipFeatures(NamedTuple):
 
     label: str
     of_clip: Callable[[Params, jax.Array], jax.Array]
+    frames: int  # that a clip must have
 
 
 @jax.jit
@@ -32,7 +33,7 @@ def _i3d_features(params: Params, frames: jax.Array) -> jax.Array:
     return i3d(params, resized[None])[0]
 
 
-# params: io.weights.metric_weights.lpips_weights; any t >= 2, h and w >= 31
-ALEXNET = ClipFeatures("Frechet distance (AlexNet features)", _alexnet_features)
-# params: io.weights.metric_weights.i3d_weights, from a file that the user converts; t >= 9
-I3D = ClipFeatures("FVD (I3D)", _i3d_features)
+# params: io.weights.metric_weights.lpips_weights; h and w >= 31
+ALEXNET = ClipFeatures("Frechet distance (AlexNet features)", _alexnet_features, 2)
+# params: io.weights.metric_weights.i3d_weights, from a file that the user converts
+I3D = ClipFeatures("FVD (I3D, Kinetics-400 logits)", _i3d_features, MIN_FRAMES)

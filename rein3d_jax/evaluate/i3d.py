@@ -10,12 +10,12 @@ import jax.numpy as jnp
 
 Params = Mapping[str, jax.Array]
 SIDE = 224  # pixels, what it was trained on
-_MIN_FRAMES = 9  # frames: the last average is over two of every eight
+MIN_FRAMES = 9  # frames: the last average is over two of every eight
 
 
 def i3d(params: Params, videos: jax.Array) -> jax.Array:
     """Logits (n, 400), averaged over time, of videos (n, t, 224, 224, 3), sRGB in [0, 1], t >= 9."""
-    assert videos.shape[2:] == (SIDE, SIDE, 3) and videos.shape[1] >= _MIN_FRAMES, videos.shape
+    assert videos.shape[2:] == (SIDE, SIDE, 3) and videos.shape[1] >= MIN_FRAMES, videos.shape
     x = _unit(params, "Conv3d_1a_7x7", 2 * videos - 1, stride=2)
     x = _largest(x, (1, 3, 3), (1, 2, 2))
     x = _unit(params, "Conv3d_2c_3x3", _unit(params, "Conv3d_2b_1x1", x))

@@ -26,10 +26,16 @@ def join_hosts(address: str | None, count: int | None, index: int | None) -> Non
 
 
 def data_mesh(devices: int = 0) -> Mesh:
-    """A row of the first `devices` devices; 0 takes all, of all hosts. Raises InputError where there are fewer."""
-    available = jax.devices()
+    """A row of `devices` devices, as many of each host; 0 takes all. Raises InputError where there are fewer, or where
+    they cannot be shared out so."""
+    available, hosts = jax.devices(), jax.process_count()
     if devices > len(available):
         raise InputError(f"{devices} devices are asked for, but jax sees {len(available)}; lower devices, or 0 for all")
+    if devices and hosts > 1:
+        if devices % hosts:
+            raise InputError(f"devices {devices} is not divided by {hosts} processes; make it a multiple, or 0 for all")
+        each = devices // hosts
+        available = [device for host in range(hosts) for device in jax.local_devices(host)[:each]]
     return Mesh(np.array(available[: devices or None]), (DATA,), axis_types=(AxisType.Auto,))
 
 

@@ -29,9 +29,9 @@ def initial_state(gaussians: Gaussians, config: RefineConfig, *, extent: float, 
     """A fresh optimizer over `gaussians`, whose harmonics have the config's degree. `fixed`, (n,) bool or None, are
     the Gaussians that nothing may change."""
     parameters = split_parameters(gaussians)
-    zeros = jnp.zeros(gaussians.alive.shape[0])
+    pull, seen = (jnp.zeros(gaussians.alive.shape[0]) for _ in range(2))  # two buffers: each may be donated
     floor = jnp.min(gaussians.log_scales, axis=-1) + jnp.log(jnp.maximum(config.min_scale, 1e-6))
     fixed = jnp.zeros_like(gaussians.alive) if fixed is None else fixed & gaussians.alive
     optimizer = make_optimizer(config).init(parameters)
     step = jnp.zeros((), jnp.int32)
-    return RefineState(parameters, gaussians.alive, floor, fixed, jnp.float32(extent), optimizer, step, zeros, zeros)
+    return RefineState(parameters, gaussians.alive, floor, fixed, jnp.float32(extent), optimizer, step, pull, seen)

@@ -125,6 +125,8 @@ def as_one_of_two(port: int, index: int):
     """Raises AssertionError where two processes, each with its half of the points, have another gradient."""
     join_hosts(f"127.0.0.1:{port}", 2, index)
     assert (jax.process_count(), jax.process_index(), jax.device_count()) == (2, index, 2)
+    with pytest.raises(InputError, match="devices 1 is not divided by 2 processes"):
+        data_mesh(1)
     half = POINTS[4 * index : 4 * index + 4]
     whole = gather(share_batch(data_mesh(), half))
     np.testing.assert_array_equal(whole, POINTS)

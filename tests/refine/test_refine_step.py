@@ -60,3 +60,9 @@ def test_a_step_does_not_depend_on_the_unit_of_length(toy, config, step) -> None
         # the gradient itself is nothing but rounding its sign is anyone's: few are.
         differs = np.abs(np.asarray(comparable[name] - small[name])) > 0.01 * rate + 1e-6
         assert differs.mean() < 0.02, name
+
+
+def test_no_two_leaves_of_a_first_state_are_one_buffer(toy, config) -> None:
+    """XLA refuses to be given one buffer twice, as a step that uses its state up would."""
+    leaves = jax.tree.leaves(initial_state(toy()[2], config, extent=EXTENT))
+    assert len({leaf.unsafe_buffer_pointer() for leaf in leaves if leaf.size}) == sum(leaf.size > 0 for leaf in leaves)

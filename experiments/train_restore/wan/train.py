@@ -61,7 +61,8 @@ def device_memory() -> int:
 
 def _first_state(config: WanTrainConfig, checkpoints: TrainingCheckpoints, resume: bool) -> WanState:
     last = last_step(config, checkpoints, resume)
+    network, words = config.network, config.sampling.words
     random = config.weights is None
-    params = random_wan(config.seed, config.network) if random else read_wan(config.weights, config.network)
+    params = random_wan(config.seed, network) if random else read_wan(config.weights, network, words=words)
     state = jax.tree.map(np.asarray, initial_wan_state(params, config))  # NumPy's arrays may be laid over any devices
     return state if last is None else state.replace(train=checkpoints.restore(last, state.train))

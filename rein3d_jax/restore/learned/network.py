@@ -95,7 +95,7 @@ class Network(nn.Module):
 
     def _trunk(self, tokens: jax.Array, level: jax.Array, rows: int, columns: int) -> jax.Array:
         angles = rotary_angles(rows, columns, self.config.width // self.config.heads)
-        waves = level[:, None] * jnp.pi * 2.0 ** jnp.arange(-1, 5)
+        waves = level[:, None] * jnp.pi * (2.0 ** jnp.arange(-1, 5)).astype(level.dtype)
         level = nn.Dense(self.config.width)(jnp.concatenate([jnp.sin(waves), jnp.cos(waves)], axis=-1))
         stack = nn.scan(
             TransformerBlock,

@@ -3,6 +3,11 @@ said in a line."""
 
 import hashlib
 import json
+import os
+import signal
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import jax
@@ -190,14 +195,33 @@ def scenes(tmp_path):
 
 
 @pytest.mark.slow
-def test_two_ray_workers_write_what_one_process_does(scenes, tmp_path):
+def test_two_ray_workers_one_of_them_killed_write_what_one_process_does(scenes, tmp_path, monkeypatch):
     config = DatasetConfig(str(tmp_path / "one"), clips=4, clips_per_shard=1, scenes=scenes, pairs=TINY)
     one = build(config)
     manifest = manifest_of(config)
     assert manifest["clips"] == 2 and manifest["left_out"] == 2
     assert "shaft.obj" in manifest["shards"][3]["left_out"][0]
-    build_with_ray(DatasetConfig(**{**vars(config), "output": str(tmp_path / "two")}), 2)
+    monkeypatch.setenv("REIN3D_DATASET", str(tmp_path))  # by which its workers are known
+    with ThreadPoolExecutor(1) as pool:
+        killed = pool.submit(kill_a_worker, tmp_path)
+        build_with_ray(DatasetConfig(**{**vars(config), "output": str(tmp_path / "two")}), 2)
+    assert killed.result()
     assert bytes_in(tmp_path / "two") == one
+
+
+def kill_a_worker(tmp_path) -> bool:
+    """Once the first shard is there, a Ray process that is at work."""
+    until = time.monotonic() + 240
+    while time.monotonic() < until:
+        if list((tmp_path / "two").glob("pairs-*.json")):
+            for place in Path("/proc").glob("[0-9]*"):
+                with suppress(OSError):
+                    ours = f"REIN3D_DATASET={tmp_path}".encode() in (place / "environ").read_bytes()
+                    if ours and (place / "cmdline").read_bytes().startswith(b"ray::_part"):
+                        os.kill(int(place.name), signal.SIGKILL)
+                        return True
+        time.sleep(0.02)
+    return False
 
 
 def test_houses_give_a_place_for_each_room(tmp_path, monkeypatch):

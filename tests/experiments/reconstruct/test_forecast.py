@@ -4,7 +4,9 @@ import dataclasses
 
 import pytest
 
+from experiments.config import load_config
 from experiments.reconstruct.config import ReconstructConfig
+from experiments.reconstruct.diffusion_cost import restore_seconds, told_cost
 from experiments.reconstruct.forecast import COUNTED, SecondsForecast, recalled
 
 CONFIG = ReconstructConfig()
@@ -58,3 +60,15 @@ def test_programs_are_shared_by_pictures_with_a_distance_and_without(tmp_path):
     photo = forecast(tmp_path, input=dataclasses.replace(CONFIG.input, distance=None)).seconds()
     given = forecast(tmp_path).seconds()
     assert photo["read"] > given["read"] + 5 and all(photo[s] == given[s] for s in COUNTED if s != "read")
+
+
+def test_the_diffusion_restorers_cost_is_told_and_is_in_the_forecast(tmp_path):
+    """The paper's: 4 paths of 41 frames, 50 passes of 172.8 TFLOP and 310.9 of the VAE each."""
+    paper = load_config(ReconstructConfig, "paper")
+    told = told_cost(paper)
+    assert "4 x 41 frames at most, 50 steps without guidance, 50 passes a path, 35,806 TFLOP" in told
+    assert "H100 68.9 s" in told and "GiB" in told and told_cost(CONFIG) == ""  # as test_wan_cost.py checks
+    few = load_config(ReconstructConfig, "paper", ["restore.diffusion.sample.steps=4"])
+    assert 8 < restore_seconds(paper, 41) / restore_seconds(few, 41) < 12.5  # but for the VAE's share it were 12.5
+    extra = forecast(tmp_path, paper).work["restore"] - restore_seconds(paper, 41)
+    assert restore_seconds(CONFIG, 41) == 0 < extra < restore_seconds(paper, 41)

@@ -80,6 +80,16 @@ def test_the_first_step_is_not_followed_either_where_it_is_not_finite(poison):
     assert (int(bad.skipped), float(bad.running_norm)) == (1, 0.0)
 
 
+def test_a_state_can_be_donated():
+    """No two leaves are one buffer, which XLA would refuse to take twice; and the parameters stay the caller's."""
+    given = jax.tree.map(jnp.copy, PARAMETERS)
+    donating = jax.jit(partial(guarded_step, total=alone, loss=loss, config=CONFIG), donate_argnums=0)
+    state = first_state(given, CONFIG)
+    after, _ = donating(state, BATCH[None])
+    assert state.average["a"].is_deleted() and int(after.step) == 1
+    jax.tree.map(np.testing.assert_array_equal, after, step(first_state(PARAMETERS, CONFIG), BATCH[None])[0])
+
+
 def test_four_devices_have_the_gradient_of_one():
     """Both backends, in a process of its own: a process has the devices that it begins with."""
     flags = f"{os.environ.get('XLA_FLAGS', '')} --xla_force_host_platform_device_count=4"

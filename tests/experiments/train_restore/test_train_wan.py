@@ -150,7 +150,8 @@ def test_what_cannot_be_trained_is_refused(folder, tmp_path, capsys):
 def test_the_papers_recipe_is_the_papers():
     config = load_config(WanTrainConfig, RECIPES / "paper_train.toml")
     assert (config.steps, config.batch, config.optimizer.rate, config.optimizer.cooldown) == (5000, 32, 5e-5, 0)
-    assert config.network == WanConfig(DitConfig(remat=True)) and config.objective.latitude == 0.1
+    assert config.network == WanConfig(DitConfig(remat=True), VaeConfig(dtype="bfloat16"))
+    assert config.objective.latitude == 0.1
 
 
 def test_a_folder_that_lacks_a_part_is_named(tmp_path):
