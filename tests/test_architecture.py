@@ -47,7 +47,11 @@ HOMES = {
     "av": ("rein3d_jax/io/pictures/video.py",),
     "orbax": ("rein3d_jax/io/files/",),
     "trimesh": ("rein3d_jax/io/meshes/",),
-    "skimage": ("rein3d_jax/io/meshes/surface_mesh.py",),
+    "pxr": ("rein3d_jax/io/exports/usd.py",),
+    "zstandard": ("rein3d_jax/io/splats/spz_streams.py",),
+    "skimage": ("rein3d_jax/io/meshes/surface_mesh.py", "rein3d_jax/meshes/collider.py"),
+    "manifold3d": ("rein3d_jax/meshes/solid.py",),
+    "vhacdx": ("rein3d_jax/meshes/convex_parts.py",),
     "PIL": ("rein3d_jax/io/pictures/colour_profile.py", "rein3d_jax/io/meshes/"),  # trimesh's pictures
     "safetensors": ("rein3d_jax/io/weights/",),
     "matplotlib": ("experiments/evaluate/chart.py", "experiments/ablate/chart.py"),

@@ -1,4 +1,4 @@
-"""A box room in closed form: patterned, white, or with a mirror for a wall; seen from anywhere, lifted, or as views.
+"""A box room in closed form: patterned or white; seen from anywhere, lifted, or as views.
 For `benchmarks.stability`."""
 
 from collections.abc import Callable
@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from rein3d_jax.geometry.poses import rigid
-from rein3d_jax.geometry.shell import RoomShell, meet_shell, world_from_shell
+from rein3d_jax.geometry.shell import RoomShell, meet_shell
 from rein3d_jax.geometry.sphere import rays_of_pose, world_from_camera_axes
 from rein3d_jax.lift import LiftConfig, lift, with_capacity
 from rein3d_jax.refine import Views, ViewsConfig, join_views, views_from_panorama
@@ -16,7 +16,6 @@ from rein3d_jax.scene import Gaussians, Panorama
 
 HEIGHT = 32  # rows of a panorama: 2,048 Gaussians
 BOX = RoomShell(*(jnp.asarray(x) for x in (0.2, (2.2, 1.8, 2.4, 1.6), 1.5, 1.2)))
-MIRROR = 0  # the face that is one, in the mirror room
 PLACES = [0.7 * np.array([np.cos(a), np.sin(a), 0.3 * np.sin(3 * a)]) for a in np.arange(6) * np.pi / 3]  # fitted to
 
 Paint = Callable[[jax.Array, jax.Array, jax.Array], jax.Array]  # points, faces, rays -> colours
@@ -34,16 +33,6 @@ def white(points: jax.Array, face: jax.Array, rays: jax.Array) -> jax.Array:
     return jnp.full_like(points, 0.9)
 
 
-def mirrored(points: jax.Array, face: jax.Array, rays: jax.Array) -> jax.Array:
-    """The pattern; on the mirror, what a ray that it throws back meets."""
-    normal = world_from_shell(BOX)[:, 0]
-    back = rays - 2 * (rays @ normal)[..., None] * normal
-    inside = (points - 1e-3 * normal).reshape(-1, 3)
-    reach, other = (x.reshape(face.shape) for x in jax.vmap(meet_shell, (None, 0, 0))(BOX, inside, back.reshape(-1, 3)))
-    seen = pattern(points + reach[..., None] * back, other, back)
-    return jnp.where((face == MIRROR)[..., None], 0.9 * seen, pattern(points, face, rays))
-
-
 def pose_at(place) -> jax.Array:
     """world_from_camera of an upright panorama at yaw 0."""
     return rigid(world_from_camera_axes(), jnp.asarray(place, jnp.float32))
@@ -56,23 +45,21 @@ def true_panorama(place, paint: Paint) -> tuple[jax.Array, jax.Array, jax.Array]
     return paint(jnp.asarray(place) + distance[..., None] * rays, face, rays), distance, face
 
 
-def lifted(paint: Paint, *, unit: float = 1.0, spare: float = 1.0, noise: float = 0.0) -> Gaussians:
-    """The box as it is from the origin, in `unit`s of length, distances off by a share of `noise`."""
+def lifted(paint: Paint, *, spare: float = 1.0, noise: float = 0.0) -> Gaussians:
+    """The box as it is from the origin, distances off by a share of `noise`, and a share of `spare` slots."""
     rgb, distance, _ = true_panorama(np.zeros(3), paint)
-    distance *= unit * jnp.exp(noise * jax.random.normal(jax.random.key(0), distance.shape))
+    distance *= jnp.exp(noise * jax.random.normal(jax.random.key(0), distance.shape))
     everywhere = jnp.ones(distance.shape, bool)
     scene = lift(Panorama(rgb, distance, everywhere), pose_at(np.zeros(3)), everywhere, config=LiftConfig())
     return with_capacity(scene, int(scene.alive.size * (1 + spare)))
 
 
-def views_of(
-    paint: Paint, config: ViewsConfig, *, unit: float = 1.0, tint=lambda source: 0.0, weight=lambda source: 1.0
-) -> Views:
+def views_of(paint: Paint, config: ViewsConfig, *, tint=lambda source: 0.0, weight=lambda source: 1.0) -> Views:
     """Of the box from the origin (source 0) and from PLACES (sources 1 and 2 alternately)."""
     parts = []
     for index, place in enumerate([np.zeros(3), *PLACES]):
         source = 0 if index == 0 else 1 + index % 2
         rgb, distance, _ = true_panorama(place, paint)
-        frame = (rgb + tint(source), weight(source) * jnp.ones_like(distance), pose_at(unit * place))
+        frame = (rgb + tint(source), weight(source) * jnp.ones_like(distance), pose_at(place))
         parts.append(views_from_panorama(*frame, yaw=0.3 * index, config=config))
     return join_views(*parts)

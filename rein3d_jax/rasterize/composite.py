@@ -22,7 +22,7 @@ from rein3d_jax.rasterize.quadratic import axes_entries, coefficients, evaluate_
 from rein3d_jax.rasterize.tile import Chunks
 from rein3d_jax.scene import Camera
 
-_BLOCK = 128  # chunks handled at a time: what a step makes fits a core's second-level cache
+_BLOCK = 512  # chunks handled at a time: their carry fits a core's second-level cache
 _UNROLL = 4  # Gaussians a step of the loop
 _EMPTY = -100.0  # log opacity of a slot without a Gaussian: alpha 0
 

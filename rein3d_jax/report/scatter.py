@@ -53,7 +53,8 @@ def scatter_chart(scatter: Scatter) -> str:
 def cost_ticks(costs: list[float]) -> np.ndarray:
     """Multiples 1, 2 and 5 of powers of ten that hold all `costs` between them; every one, or powers alone where those
     are many."""
-    low, high = math.floor(math.log10(min(costs))), math.ceil(math.log10(max(costs)) + 1e-9)
+    # A logarithm may round to a whole number, on either side of it.
+    low, high = math.floor(math.log10(min(costs)) - 1e-9), math.ceil(math.log10(max(costs)) + 1e-9)
     factors = (1, 2, 5) if high - low <= 2 else (1,)
     ticks = np.array([factor * 10.0**power for power in range(low, high + 1) for factor in factors])
     first, last = np.flatnonzero(ticks <= min(costs))[-1], np.flatnonzero(ticks >= max(costs))[0]

@@ -32,7 +32,8 @@ def restore_navier_stokes(video: Video, *, observed: float, background=None) -> 
 
 def _inpaint(video: Video, observed: float, method: int) -> Video:
     holes = np.asarray(video.alpha < observed)
-    frames = [_inpaint_frame(*frame, method) for frame in zip(video.rgb, video.distance, holes, strict=True)]
+    given = (np.asarray(video.rgb), np.asarray(video.distance), holes)  # JAX would compile for each hole's size
+    frames = [_inpaint_frame(*frame, method) for frame in zip(*given, strict=True)]
     rgb, distance = (jnp.stack(list(part)) for part in zip(*frames, strict=True))
     return video.replace(rgb=rgb, distance=distance)
 

@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 import html5lib
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from rein3d_jax.report.chart import MAX_POINTS, Chart, Series, line_chart, nice_ticks
@@ -172,6 +172,7 @@ def test_any_marks_give_a_chart(marks):
 
 
 @given(st.lists(st.floats(1e-3, 1e6), min_size=1, max_size=5))
+@example([999999.9999999999])  # whose logarithm rounds to 6
 def test_cost_ticks_hold_all_costs(costs):
     ticks = cost_ticks(costs)
     assert len(ticks) >= 2 and ticks[0] <= min(costs) and max(costs) <= ticks[-1]

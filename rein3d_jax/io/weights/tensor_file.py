@@ -6,6 +6,7 @@ X.scale_weight or X.weight_scale, and write more that only their own arithmetic 
 
 import json
 from contextlib import ExitStack
+from functools import cached_property
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -16,7 +17,8 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.input_file import require_file
 
 FLOAT_8 = {"F8_E4M3": jnp.float8_e4m3fn, "F8_E5M2": jnp.float8_e5m2}
-FLOATS = ("BF16", "F16", "F32", "F64", *FLOAT_8)
+_TYPES = {"BF16": jnp.bfloat16, "F16": jnp.float16, "F32": jnp.float32, "F64": np.float64, **FLOAT_8}
+FLOATS = tuple(_TYPES)
 SCALED_MARK = "scaled_fp8"  # a tensor of ComfyUI's files whose 8-bit tensors all have scales
 _PREFIX = "model.diffusion_model."  # before all names where a whole ComfyUI checkpoint was saved
 _SCALES = (".scale_weight", ".weight_scale")
@@ -51,11 +53,9 @@ class TensorFile:
         return self._slice(name).get_dtype()
 
     def read(self, name: str) -> np.ndarray:
-        """A tensor in its stored type. Raises InputError where it cannot be read."""
+        """A tensor of FLOATS in its stored type. Raises InputError where it cannot be read."""
         try:
-            if (kind := self.kind(name)) in FLOAT_8:  # NumPy has no such type, so that the library gives none
-                return self._bytes(name).view(jnp.dtype(FLOAT_8[kind])).reshape(self.shape(name))
-            return self._file.get_tensor(self._stored[name])
+            return self._bytes(name).view(jnp.dtype(_TYPES[self.kind(name)])).reshape(self.shape(name))
         except (SafetensorError, OSError, ValueError) as error:
             raise InputError(f"{self.path}: {name} cannot be read ({error}): copy the file again") from error
 
@@ -63,11 +63,21 @@ class TensorFile:
         return self._file.get_slice(self._stored[name])
 
     def _bytes(self, name: str) -> np.ndarray:
-        """Those between the tensor's offsets, which count from the header's end."""
+        """Read, and not mapped: pages of a mapped file count as the process's own beside what was made of them. And
+        NumPy has no 8-bit floats, so that the library gives none."""
+        begin, end = self._offsets[self._stored[name]]["data_offsets"]
+        return np.fromfile(self.path, np.uint8, end - begin, offset=self._data + begin)
+
+    @cached_property
+    def _offsets(self) -> dict:
         with open(self.path, "rb") as file:
-            length = int.from_bytes(file.read(8), "little")
-            begin, end = json.loads(file.read(length))[self._stored[name]]["data_offsets"]
-        return np.fromfile(self.path, np.uint8, end - begin, offset=8 + length + begin)
+            return json.loads(file.read(self._data)[8:])
+
+    @cached_property
+    def _data(self) -> int:
+        """Where the header ends, from which offsets count."""
+        with open(self.path, "rb") as file:
+            return 8 + int.from_bytes(file.read(8), "little")
 
 
 def scale_names(name: str) -> tuple[str, ...]:
