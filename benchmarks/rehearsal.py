@@ -27,6 +27,7 @@ from rein3d_jax.networks.wan import random_wan, read_wan, write_wan
 from rein3d_jax.restore.blend import blend
 from rein3d_jax.restore.wan.condition import control_latents
 from rein3d_jax.restore.wan.config import SMALL, TINY, DitConfig, VaeConfig, WanConfig
+from rein3d_jax.restore.wan.cost import clip_cost, seconds_by_device
 from rein3d_jax.restore.wan.names import LAYOUTS, dit_rows, vae_rows
 from rein3d_jax.restore.wan.restore import DiffusionConfig, SampleConfig, clip_noise, clip_velocity
 from rein3d_jax.restore.wan.sampler import sample_latents
@@ -90,11 +91,13 @@ def _run(options) -> None:
     params = _weights(Path(options.weights), config, options.layouts, parts)
     figures = _clip(params, DiffusionConfig(config, SampleConfig(steps=options.steps)), shape, parts)
     need = forecast(config, Workload(*shape))
+    seconds = seconds_by_device(clip_cost(DiffusionConfig(config, SampleConfig(steps=options.steps)), *shape))
     size = sum(leaf.nbytes for leaf in jax.tree.leaves(params))
     result = {
         "device": jax.devices()[0].device_kind, "jax": jax.__version__, "preset": options.preset,
         "dtype": options.dtype, "clip": shape, "steps": options.steps, "weights_bytes": size,
-        "foreseen_bytes": dataclasses.asdict(need) | {"total": need.total}, **figures, "parts": parts.rows,
+        "foreseen_bytes": dataclasses.asdict(need) | {"total": need.total}, "foreseen_seconds": seconds,
+        **figures, "parts": parts.rows,
     }  # fmt: skip
     print(json.dumps({key: value for key, value in result.items() if key != "parts"}, indent=1))
     if options.json:

@@ -11,6 +11,9 @@ from rein3d_jax.restore.learned.candidates import clip_of
 from rein3d_jax.restore.learned.sample import Learned, sample_clip
 from rein3d_jax.scene import Video
 
+# Standard deviations of the anchor's colours that a guess may go beyond its fills. The network errs by 0.07 however
+# plain a room is, where fills hardly err; in a room with contrast few guesses go that far (benchmarks/README.md).
+_BEYOND_FILLS = 1.5
 _GROUP = 4  # frames: a clip is made up to a multiple of it, so that few lengths are compiled
 
 
@@ -36,8 +39,15 @@ def restore_learned(
     clip = clip_of(video, observed=observed, background=background)
     padded = jax.tree.map(partial(_padded, count=-len(clip.alpha) % _GROUP), clip)
     drawn = sample_clip(key, learned, padded, steps)[: len(clip.alpha)]
-    rgb = blend_unmatched(jnp.clip(drawn[..., :3], 0.0, 1.0), video.rgb, video.alpha, observed=observed)
+    guess = jnp.clip(_near_fills(drawn[..., :3], clip.fill_rgb), 0.0, 1.0)
+    rgb = blend_unmatched(guess, video.rgb, video.alpha, observed=observed)
     return video.replace(rgb=rgb, distance=clip.fill_distance[..., 0])
+
+
+def _near_fills(colours: jax.Array, fills: jax.Array) -> jax.Array:
+    """Colours (t, h, w, 3) within reach of their fills' (t, h, w, CANDIDATES, 3)."""
+    reach = _BEYOND_FILLS * jnp.std(fills[0, :, :, 0], axis=(0, 1))
+    return jnp.clip(colours, jnp.min(fills, axis=-2) - reach, jnp.max(fills, axis=-2) + reach)
 
 
 def _padded(frames: jax.Array, count: int) -> jax.Array:
