@@ -4,6 +4,7 @@ import gsplat
 import torch
 
 from benchmarks.engines.engine import Engine
+from benchmarks.engines.torch_engine import torch_engine
 from benchmarks.workloads import Workload
 
 
@@ -22,18 +23,4 @@ def build(workload: Workload) -> Engine:
         given = (means, quats, scales, opacities, colours, pose, intrinsics)
         return gsplat.rasterization(*given, size.width, size.height, packed=False)[0][0]
 
-    def forward():
-        with torch.no_grad():
-            return draw()
-
-    def gradient():
-        return torch.autograd.grad(torch.mean((draw() - target) ** 2), leaves)
-
-    adam = torch.optim.Adam(leaves, lr=1e-3, eps=1e-15)
-
-    def step():
-        for leaf, slope in zip(leaves, gradient(), strict=True):
-            leaf.grad = slope
-        adam.step()
-
-    return Engine(forward, gradient, lambda result: torch.cuda.synchronize(), step)
+    return torch_engine(draw, leaves, target, lambda result: torch.cuda.synchronize())

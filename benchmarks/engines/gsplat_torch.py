@@ -13,6 +13,7 @@ import torch
 from gsplat.cuda import _torch_impl, _wrapper
 
 from benchmarks.engines.engine import Engine
+from benchmarks.engines.torch_engine import torch_engine
 from benchmarks.workloads import Workload
 
 TILE = 16
@@ -112,18 +113,4 @@ def build(workload: Workload, own_lists: bool = True) -> Engine:
     def draw():
         return render(*leaves, workload.focal, size.width, size.height, own_lists)
 
-    def forward():
-        with torch.no_grad():
-            return draw()
-
-    def gradient():
-        return torch.autograd.grad(torch.mean((draw() - target) ** 2), leaves)
-
-    adam = torch.optim.Adam(leaves, lr=1e-3, eps=1e-15)
-
-    def step():
-        for leaf, slope in zip(leaves, gradient(), strict=True):
-            leaf.grad = slope
-        adam.step()
-
-    return Engine(forward, gradient, lambda result: result, step)
+    return torch_engine(draw, leaves, target, lambda result: result)

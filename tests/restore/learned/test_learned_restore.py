@@ -70,7 +70,6 @@ def test_a_room_of_one_colour_gets_no_other(room):
     np.testing.assert_allclose(restored, 0.4, atol=1e-3)  # fills are averages in float32
 
 
-
 @BACKGROUNDS
 def test_observed_pixels_stay_to_the_bit_and_all_is_finite(room):
     video = video_of(3)
