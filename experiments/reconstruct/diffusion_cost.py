@@ -18,7 +18,7 @@ def told_cost(config: ReconstructConfig) -> str:
     paths, sample = config.explore.trajectories, config.restore.diffusion.sample
     cost = path_cost(config, config.explore.max_frames)
     each = ", ".join(f"{name} {_short(paths * number)} s" for name, number in seconds_by_device(cost).items())
-    memory = forecast(config.restore.diffusion.network, _window(config)).total / GIB
+    memory = _network_bytes(config) / GIB
     guidance = "without guidance" if sample.guidance == 1 else f"guidance {sample.guidance:g}"
     clips = f"{paths} x {config.explore.max_frames} frames at most"
     taken = f"{sample.steps} steps {guidance}, {cost.passes} passes a path, {_short(paths * cost.total / 1e12)} TFLOP"
@@ -33,6 +33,17 @@ def _window(config: ReconstructConfig) -> Workload:
     """The longest clip that is restored at once."""
     frames = min(config.restore.diffusion.sample.windows.frames, padded_length(config.explore.max_frames))
     return Workload(frames, config.restore.height, 2 * config.restore.height)
+
+
+def _network_bytes(config: ReconstructConfig) -> int:
+    return forecast(config.restore.diffusion.network, _window(config)).total
+
+
+def restore_bytes(config: ReconstructConfig) -> int:
+    """Bytes of the machine's memory that the network takes; 0 for other restorers, and on accelerators, which have
+    their own."""
+    on_cpu = jax.devices()[0].platform == "cpu"
+    return _network_bytes(config) if on_cpu and config.restore.method == DIFFUSION else 0
 
 
 def path_cost(config: ReconstructConfig, frames: int) -> ClipCost:

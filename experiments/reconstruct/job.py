@@ -15,7 +15,7 @@ from experiments.config import dump_config
 from experiments.machine import machine_bytes
 from experiments.reconstruct.budget import OUT_OF_TIME, Clock, check_memory, foreseen_bytes, within
 from experiments.reconstruct.config import ReconstructConfig
-from experiments.reconstruct.diffusion_cost import told_cost
+from experiments.reconstruct.diffusion_cost import restore_bytes, told_cost
 from experiments.reconstruct.forecast import SecondsForecast
 from experiments.reconstruct.inputs import input_fingerprint, input_views, levelled_views, told_panorama, working_rows
 from experiments.reconstruct.outputs import write_outputs
@@ -81,7 +81,7 @@ def run_job(config: ReconstructConfig, *, resume: bool = False) -> dict:
     check_memory(rows, machine_bytes())
     files = input_fingerprint(config.input)
     forecast = SecondsForecast(config, rows, upsampled=_as_it_is(config)[1] < rows)
-    foreseen = {"foreseen_seconds": forecast.seconds(), "foreseen_bytes": foreseen_bytes(rows)}
+    foreseen = {"foreseen_seconds": forecast.seconds(), "foreseen_bytes": foreseen_bytes(rows) + restore_bytes(config)}
     write_text(output / "config.toml", _header() + dump_config(config))
     config = within(config, config.budget)
     with Progress(config, **foreseen) as progress:
