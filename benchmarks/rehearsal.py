@@ -13,6 +13,7 @@ import resource
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import jax
@@ -22,13 +23,12 @@ import numpy as np
 from experiments.command import CommandParser
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
-from rein3d_jax.io.weights.safetensors_folder import save_params
 from rein3d_jax.networks.wan import random_wan, read_wan, write_wan
 from rein3d_jax.restore.blend import blend
 from rein3d_jax.restore.wan.condition import control_latents
 from rein3d_jax.restore.wan.config import SMALL, TINY, DitConfig, VaeConfig, WanConfig
 from rein3d_jax.restore.wan.cost import clip_cost, seconds_by_device
-from rein3d_jax.restore.wan.names import LAYOUTS, dit_rows, vae_rows
+from rein3d_jax.restore.wan.names import LAYOUTS
 from rein3d_jax.restore.wan.restore import DiffusionConfig, SampleConfig, clip_noise, clip_velocity
 from rein3d_jax.restore.wan.sampler import sample_latents
 from rein3d_jax.restore.wan.schedule import sampling_sigmas
@@ -110,23 +110,12 @@ def _weights(folder: Path, config: WanConfig, layouts, parts: Parts):
     if lacking:
         drawn = parts.run("draw", random_wan, 0, config)
         for name in lacking:
-            parts.run(f"write {name}", _write, folder / name, drawn, config, name)
+            parts.run(f"write {name}", partial(write_wan, folder / name, drawn, config, layout=name))
         del drawn
     for name in layouts:
         params = None  # one at a time
         params = parts.run(f"read {name}", read_wan, folder / name, config)
     return params
-
-
-def _write(folder: Path, params, config: WanConfig, layout: str) -> None:
-    write_wan(folder, params, config)
-    if layout != "diffusers":
-        for name, rows, part, sizes in (
-            ("transformer", dit_rows, params.dit, config.dit), ("vae", vae_rows, params.vae, config.vae)
-        ):  # fmt: skip
-            for old in (folder / name).glob("*.safetensors*"):
-                old.unlink()
-            save_params(folder / name, rows(part, sizes, layout), part)
 
 
 def _clip(params, config: DiffusionConfig, shape: tuple[int, int, int], parts: Parts) -> dict:

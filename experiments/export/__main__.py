@@ -3,10 +3,10 @@
     python -m experiments.export runs/room --to isaac unity nerfstudio posed-frames spz [--output FOLDER]
 
 Writes into the run's `export` folder, or into --output. Folders to hand over, with a README.txt: headset, unity,
-unreal, blender, isaac, web. Single formats: OpenUSD, glTF, a mesh, a collider,
-a navigation mesh, and the scene as PLY, SuperSplat's compressed PLY,
-SPZ or .splat. To train and test on: nerfstudio and COLMAP data sets of the input's and the restored frames' views,
-panoramas of the scene (JPEG, and EXR with distance), and what an RGB-D camera sees along a walk.
+unreal, blender, isaac, web. Single formats: OpenUSD, glTF, a mesh, a collider, a navigation mesh, and the scene as
+PLY, SuperSplat's compressed PLY, SPZ, SOG or .splat. To train and test on: nerfstudio and COLMAP data sets of the
+input's and the restored frames' views, panoramas of the scene (JPEG, and EXR with distance), and what an RGB-D camera
+sees along a walk.
 """
 
 import argparse

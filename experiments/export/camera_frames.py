@@ -8,9 +8,7 @@ import numpy as np
 
 from experiments.export.walk import headings
 from experiments.run_folder import RunFolder
-from rein3d_jax.conventions import PINHOLE
-from rein3d_jax.geometry.pinhole import focal_from_fov
-from rein3d_jax.geometry.poses import upright
+from rein3d_jax.geometry.poses import pinhole_camera, upright
 from rein3d_jax.geometry.rotations import matrix_from_quats
 from rein3d_jax.geometry.spherical_harmonics import sh_from_rgb
 from rein3d_jax.io.exports.posed_frames import PosedFrame
@@ -27,7 +25,7 @@ def camera_frames(run: RunFolder, places: np.ndarray, size: tuple[int, int]) -> 
     scene, raster, buffers = run.refined, run.config.rasterize, None
     axes = shortest_axes(scene)
     for place, yaw in zip(places, headings(places), strict=True):
-        camera = _camera(place, float(yaw), size)
+        camera = pinhole_camera(upright(jnp.array([*place, 0.0]), float(yaw)), size, _FOV)
         seen, buffers = render(scene, camera, config=raster, buffers=buffers)
         facing, buffers = render(_painted(scene, axes, camera), camera, config=raster, buffers=buffers)
         alpha = seen.alpha[..., None]
@@ -52,10 +50,3 @@ def _painted(scene: Gaussians, axes: jnp.ndarray, camera: Camera) -> Gaussians:
     """The scene with its normals towards the camera as colours: 0.5 + 0.5 n."""
     away = jnp.sum(axes * (scene.means - camera.world_from_camera[:3, 3]), axis=1, keepdims=True) > 0
     return scene.replace(sh=sh_from_rgb(0.5 + 0.5 * jnp.where(away, -axes, axes))[:, None])
-
-
-def _camera(place: np.ndarray, yaw: float, size: tuple[int, int]) -> Camera:
-    height, width = size
-    focal = jnp.full(2, focal_from_fov(_FOV, width), jnp.float32)
-    centre = jnp.array([width / 2, height / 2], jnp.float32)
-    return Camera(upright(jnp.array([*place, 0.0]), yaw), focal, centre, PINHOLE, width, height)

@@ -6,10 +6,8 @@ from collections.abc import Iterator
 import jax.numpy as jnp
 import numpy as np
 
-from rein3d_jax.conventions import PINHOLE
 from rein3d_jax.explore.trajectories import Trajectories
-from rein3d_jax.geometry.pinhole import focal_from_fov
-from rein3d_jax.geometry.poses import upright
+from rein3d_jax.geometry.poses import pinhole_camera, upright
 from rein3d_jax.rasterize import RasterizeConfig, allocate, render
 from rein3d_jax.scene import Camera, Gaussians
 from rein3d_jax.settings import Settings, setting
@@ -28,9 +26,7 @@ class FilmConfig(Settings):
 
 
 def _camera(position, yaw, film: FilmConfig) -> Camera:
-    focal = jnp.full(2, focal_from_fov(film.fov, film.width), jnp.float32)
-    centre = jnp.array([film.width / 2, film.height / 2])
-    return Camera(upright(position, yaw), focal, centre, PINHOLE, film.width, film.height)
+    return pinhole_camera(upright(position, yaw), (film.height, film.width), film.fov)
 
 
 def flythrough(

@@ -37,7 +37,10 @@ def equirectangular_camera(world_from_camera: jax.Array, height: int) -> Camera:
     return Camera(world_from_camera, jnp.ones(2), jnp.zeros(2), EQUIRECTANGULAR, 2 * height, height)
 
 
-def pinhole_camera(world_from_camera: jax.Array, size: int, fov: float) -> Camera:
-    """A square pinhole camera of `size` pixels with its axis in the middle; `fov` in radians."""
-    focal = jnp.full(2, focal_from_fov(fov, size), jnp.float32)
-    return Camera(world_from_camera, focal, jnp.full(2, size / 2, jnp.float32), PINHOLE, size, size)
+def pinhole_camera(world_from_camera: jax.Array, size: int | tuple[int, int], fov: float) -> Camera:
+    """A pinhole camera of `size` pixels, (h, w) or a side of a square, with its axis in the middle; `fov` across the
+    width, in radians."""
+    height, width = (size, size) if isinstance(size, int) else size
+    focal = jnp.full(2, focal_from_fov(fov, width), jnp.float32)
+    centre = jnp.array([width / 2, height / 2], jnp.float32)
+    return Camera(world_from_camera, focal, centre, PINHOLE, width, height)

@@ -15,7 +15,14 @@ from rein3d_jax.geometry.spherical_harmonics import C0, sh_from_rgb
 from rein3d_jax.io.files.atomic import write_bytes
 from rein3d_jax.io.splats.gaussian_columns import REST_COUNTS, Columns, alive_columns, from_columns
 from rein3d_jax.io.splats.ply_table import header_lines
-from rein3d_jax.io.splats.quantise import alpha_bytes, alpha_logits, from_levels, to_levels, with_largest
+from rein3d_jax.io.splats.quantise import (
+    alpha_bytes,
+    alpha_logits,
+    from_levels,
+    to_levels,
+    with_largest,
+    without_largest,
+)
 from rein3d_jax.scene import Gaussians
 
 _CHUNK = 256  # Gaussians
@@ -148,9 +155,7 @@ def _join(levels: list[np.ndarray], bits: tuple[int, ...]) -> np.ndarray:
 
 def _pack_quats(quats: np.ndarray) -> np.ndarray:
     """wxyz (n, 4) -> uint32 (n,): the largest one's place, and the three others in [-1, 1] / sqrt(2)."""
-    largest = np.abs(quats).argmax(axis=1)
-    signed = quats * np.where(np.take_along_axis(quats, largest[:, None], 1) < 0, -1, 1)
-    others = signed[np.arange(4) != largest[:, None]].reshape(-1, 3)
+    others, largest = without_largest(quats)
     levels = to_levels(others * np.sqrt(0.5) + 0.5, 10)
     return _join([largest.astype(np.uint32), *levels.T], (2, 10, 10, 10))
 

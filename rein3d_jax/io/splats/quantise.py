@@ -26,9 +26,17 @@ def alpha_logits(alphas: np.ndarray) -> np.ndarray:
     return np.log(alpha / (1 - alpha)).astype(np.float32)
 
 
+def without_largest(quats: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Three components (n, 3) of quaternions (n, 4), in their order, and the place (n,) of the largest, which is left
+    out and made positive: the same rotations."""
+    largest = np.abs(quats).argmax(axis=1)
+    signed = quats * np.where(np.take_along_axis(quats, largest[:, None], axis=1) < 0, -1, 1)
+    place = np.arange(3) + (np.arange(3) >= largest[:, None])
+    return np.take_along_axis(signed, place, axis=1), largest
+
+
 def with_largest(others: np.ndarray, largest: np.ndarray) -> np.ndarray:
-    """Unit quaternions (n, 4) of three components (n, 3) in their order and the place (n,) of the largest, which is
-    positive and left out."""
+    """Unit quaternions (n, 4) of what without_largest gives: others (n, 3), and the place (n,) of the largest."""
     last = np.sqrt(np.maximum(0, 1 - (others**2).sum(axis=1, keepdims=True)))
     place = np.arange(4)
     source = np.where(place == largest[:, None], 3, place - (place > largest[:, None]))

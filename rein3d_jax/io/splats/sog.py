@@ -24,7 +24,7 @@ from rein3d_jax.io.files.atomic import write_bytes
 from rein3d_jax.io.splats.codebook import scalar_codebook, vector_palette
 from rein3d_jax.io.splats.compressed_ply import morton_order
 from rein3d_jax.io.splats.gaussian_columns import Columns, alive_columns
-from rein3d_jax.io.splats.quantise import alpha_bytes, to_levels
+from rein3d_jax.io.splats.quantise import alpha_bytes, to_levels, without_largest
 from rein3d_jax.scene import Gaussians
 
 _LOSSLESS = 101  # OpenCV's quality of a WebP
@@ -96,10 +96,7 @@ def _higher(sh: np.ndarray) -> tuple[dict, np.ndarray, np.ndarray]:
 
 
 def _smallest(quats: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    largest = np.abs(quats).argmax(axis=1)
-    signed = quats * np.where(np.take_along_axis(quats, largest[:, None], axis=1) < 0, -1, 1)
-    place = np.arange(3) + (np.arange(3) >= largest[:, None])
-    others = np.take_along_axis(signed, place, axis=1)
+    others, largest = without_largest(quats)
     return to_levels(0.5 + math.sqrt(0.5) * others, 8), 252 + largest
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_bytes
 from rein3d_jax.io.splats.gaussian_columns import REST_COUNTS, Columns, alive_columns, from_columns
-from rein3d_jax.io.splats.quantise import alpha_bytes, alpha_logits, with_largest
+from rein3d_jax.io.splats.quantise import alpha_bytes, alpha_logits, with_largest, without_largest
 from rein3d_jax.io.splats.spz_streams import MAX_SPZ_GAUSSIANS, SpzHeader, pack_spz, unpack_spz
 from rein3d_jax.scene import Gaussians
 
@@ -85,11 +85,7 @@ def _fractional_bits(means: np.ndarray, name: str | Path) -> int:
 def _smallest_three(quats: np.ndarray) -> np.ndarray:
     """wxyz (n, 4) -> (n, 4) bytes: 2 bits say which of x y z w is largest, and is left out, made positive; a sign and 9
     bits for each of the others."""
-    xyzw = np.roll(quats, -1, axis=1)
-    largest = np.abs(xyzw).argmax(axis=1)
-    signed = xyzw * np.where(np.take_along_axis(xyzw, largest[:, None], axis=1) < 0, -1, 1)
-    place = np.arange(3) + (np.arange(3) >= largest[:, None])
-    others = np.take_along_axis(signed, place, axis=1)
+    others, largest = without_largest(np.roll(quats, -1, axis=1))
     numbers = np.minimum(np.abs(others) * _STEPS + 0.5, 511).astype(np.uint32) | (others < 0).astype(np.uint32) << 9
     word = largest.astype(np.uint32) << 30 | numbers[:, 0] << 20 | numbers[:, 1] << 10 | numbers[:, 2]
     return word.astype("<u4")[:, None].view(np.uint8)
