@@ -13,7 +13,17 @@ import sys
 import time
 from pathlib import Path
 
-from benchmarks.stability import given_distance, given_picture, optimising, photo_alone, places, rendering
+from benchmarks.stability import (
+    given_distance,
+    given_picture,
+    materials,
+    needles,
+    optimising,
+    photo_alone,
+    places,
+    rendering,
+    restoring,
+)
 from benchmarks.stability.curve import lines_of, readings_of, table_of
 from benchmarks.stability.page import draw_page, require_drawing
 from benchmarks.stability.regime import Regime
@@ -23,7 +33,7 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.files.json_file import read_json
 
-PARTS = (given_distance, given_picture, photo_alone, places, rendering, optimising)
+PARTS = (given_distance, given_picture, photo_alone, places, materials, rendering, needles, restoring, optimising)
 REGIMES: dict[str, Regime] = {regime.name: regime for part in PARTS for regime in part.REGIMES}
 
 

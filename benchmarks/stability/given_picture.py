@@ -38,6 +38,6 @@ REGIMES = (
     Regime("grain of the picture", "grain that swims", "deviation, levels of 255", (0, 5, 10, 20, 40), 0, SEEN,
            spoiled_by(grainy)),
     Regime("JPEG", "blocks on walls", "quality", (5, 10, 30, 60, 95), 95, SEEN, spoiled_by(as_jpeg)),
-    Regime("rows of the picture", "soft walls, or gaps", "rows, seen at 64", (16, 32, 64, 128, 256), 64, WHOLE,
+    Regime("rows of the picture", "soft walls, or gaps", "rows, seen at 64", (16, 32, 64, 128, 256, 512), 64, WHOLE,
            seen_at_rows, seeds=2),
 )  # fmt: skip

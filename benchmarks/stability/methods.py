@@ -107,7 +107,7 @@ def peeled(panorama: Panorama, fill: str | None = None) -> Gaussians:
 
 def balls(panorama: Panorama) -> Renderer:
     """The paper's lift."""
-    return splats(_lifted(panorama, BALLS), CLASSIC)
+    return splats(lifted_by(panorama, BALLS), CLASSIC)
 
 
 def mesh(panorama: Panorama) -> Renderer:
@@ -117,7 +117,7 @@ def mesh(panorama: Panorama) -> Renderer:
 
 def telea(panorama: Panorama) -> Renderer:
     """Our lift, each view's holes inpainted."""
-    base = splats(_lifted(panorama, stages().lift))
+    base = splats(lifted_by(panorama, stages().lift))
 
     def renderer(camera: Camera) -> Rendering:
         seen = base(camera)
@@ -144,7 +144,8 @@ def _boxed(rgb, shell, camera: Camera) -> Rendering:
     return Rendering(colour, jnp.ones(distance.shape), distance)
 
 
-def _lifted(panorama: Panorama, config: LiftConfig) -> Gaussians:
+def lifted_by(panorama: Panorama, config: LiftConfig) -> Gaussians:
+    """A Gaussian a pixel."""
     placed = whole(completed(panorama))
     return lift(placed, origin_pose(), placed.valid, config=replace(config, share=1.0))
 

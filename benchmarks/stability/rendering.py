@@ -11,7 +11,7 @@ from benchmarks.poles import footprint_errors
 from benchmarks.stability.case import ROWS, Case, View, case_of, drawn_room, figures_of, traced, view_at
 from benchmarks.stability.given_distance import compare, furnished
 from benchmarks.stability.given_picture import seen_at_rows
-from benchmarks.stability.methods import METHODS, peeled
+from benchmarks.stability.methods import BALLS, CLASSIC, METHODS, lifted_by, peeled, splats
 from benchmarks.stability.regime import LARGE, OURS, SMALL, WHOLE, Figure, Figures, Regime
 from benchmarks.stability.stage import EYE, Stage, scattered, staged_room
 from experiments.evaluate.renderer import Renderer
@@ -110,6 +110,25 @@ def _in_buffers(share: float, seed: int) -> dict[str, Figures]:
     return {OURS: whole, "buffers that do not grow": cut | {"overflow": float(frame.overflow)}}
 
 
+def _in_bits(bits: float, seed: int) -> dict[str, Figures]:
+    """Numbers of the scene with so many bits after the first: 7 are bfloat16's, 10 float16's, 23 float32's. The places
+    alone keep theirs."""
+    case = furnished(seed)
+    ours, balls = peeled(case.given), lifted_by(case.given, BALLS)
+    found = {OURS: (ours, ours.means, RasterizeConfig()), "ours, places too": (ours, None, RasterizeConfig())}
+    found |= {"balls": (balls, balls.means, CLASSIC)}
+    shown = {}
+    for name, (scene, places, raster) in found.items():
+        coarse = jax.tree.map(lambda x: _rounded(x, int(bits)) if x.dtype == jnp.float32 else x, scene)
+        shown[name] = figures_of(case, splats(coarse if places is None else coarse.replace(means=places), raster))
+    return shown
+
+
+def _rounded(x: jax.Array, bits: int) -> jax.Array:
+    mantissa, exponent = jnp.frexp(x)
+    return jnp.ldexp(jnp.round(mantissa * 2.0 ** (bits + 1)) / 2.0 ** (bits + 1), exponent)
+
+
 REGIMES = (
     Regime("poles", "a star at the zenith", "degrees of latitude", (0, 45, 75, 85, 89, 89.9), 0, _FOOTPRINT, _pole,
            seeds=1, rows="1"),
@@ -124,6 +143,8 @@ REGIMES = (
     Regime("units", "nothing at all", "metres times", (0.001, 0.01, 0.1, 1, 10, 100, 1000), 1, WHOLE, _in_units,
            seeds=1, rows="7"),
     Regime("turning", "popping", "degrees a frame", (0.1, 0.2, 0.5, 1, 2), 1, _TREMBLING, _turning, rows="29"),
+    Regime("coarse numbers", "banding, and splats out of place", "bits of a mantissa", (2, 3, 5, 7, 10, 23), 23, WHOLE,
+           _in_bits, rows="19"),
     Regime("small buffers", "tiles missing", "share of what is needed", (0.25, 0.5, 0.75, 0.9, 1), 1, WHOLE,
            _in_buffers, seeds=1, rows="14"),
 )  # fmt: skip

@@ -17,7 +17,7 @@ from rein3d_jax.rooms.model import Room
 EYE = 1.6  # metres above the floor
 _SHELL = ("floor", "ceiling", "accent", "wallpaper", "accent", "picture")
 _PIECES = ("furniture", "soft", "front", "stone", "rug", "linen", "object", "pillow")
-_FIRST_PIECE = 10  # after six faces and four openings, which are not there
+FIRST_PIECE = 10  # after six faces and four openings, which are not there
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def staged_room(stage: Stage, seed: int) -> Room:
     solids = room.boxes.replace(
         centre=jnp.asarray(centre, jnp.float32), half=jnp.asarray(extent, jnp.float32),
         heading=jnp.tile(jnp.array([1.0, 0.0]), (capacity, 1)),
-        texture=_FIRST_PIECE + jnp.arange(capacity) % len(_PIECES), object=_FIRST_PIECE + jnp.arange(capacity),
+        texture=FIRST_PIECE + jnp.arange(capacity) % len(_PIECES), object=FIRST_PIECE + jnp.arange(capacity),
         count=jnp.int32(count), casters=jnp.int32(0),
     )  # fmt: skip
     low, high = (jnp.asarray(floor - camera + side * half, jnp.float32) for side in (-1, 1))

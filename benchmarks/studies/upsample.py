@@ -43,8 +43,9 @@ class Bench:
 
     def lifted(self, rgb: jax.Array, distance: jax.Array, share: float) -> tuple[Panorama, LiftConfig]:
         """What is lifted, and how."""
-        complete = complete_distance(distance, distance > 0, config=self.config.depth)
-        return whole(Panorama(rgb, complete, distance > 0)), replace(self.config.lift, share=share)
+        given = Panorama(rgb, distance, distance > 0)
+        complete = complete_distance(given, config=self.config.depth)
+        return whole(replace(given, distance=complete)), replace(self.config.lift, share=share)
 
 
 def cases(bench: Bench, given: Panorama) -> Iterator[tuple[str, tuple[Panorama, LiftConfig]]]:

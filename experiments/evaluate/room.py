@@ -143,7 +143,7 @@ class EvaluationRoom:
     def _input_at(self, height: int) -> Panorama:
         pictures = (np.asarray(x) for x in (self.given.rgb, self.given.distance, self.given.valid))
         rgb, distance, valid = (jnp.asarray(x) for x in resize_panorama(*pictures, height))
-        return Panorama(rgb, complete_distance(distance, valid, config=self.config.depth), valid)
+        return Panorama(rgb, complete_distance(Panorama(rgb, distance, valid), config=self.config.depth), valid)
 
 
 def whole(panorama: Panorama) -> Panorama:

@@ -1,6 +1,6 @@
 """A panorama's distance: completed where one was given, estimated where none was.
 
-    complete.complete_distance(distance, valid, *, config)           every pixel finite, known ones untouched
+    complete.complete_distance(panorama, *, config)                  every pixel finite, known ones untouched
     estimate.estimate_distance(rgb, parameters, camera_height)       by the network, lines and edges
     room_shell.fit_room_shell(rgb, camera_height, *, config)         the box by a picture's edges, and how well it fits
     room_shell.shell_distance(shell, height, width) -> distance      exact ray-box distance

@@ -159,7 +159,7 @@ def clip_places(key: jax.Array, path: Chord, config: PairConfig) -> tuple[jax.Ar
 
 def _degraded(panorama: Panorama, poses: jax.Array, config: PairConfig, buffers: Buffers) -> tuple[Video, jax.Array]:
     """The video, and the buffers (4,) that it called for: it is whole where `buffers` are as large."""
-    distance = complete_distance(panorama.distance, panorama.valid, config=config.depth)
+    distance = complete_distance(panorama, config=config.depth)
     everywhere = jnp.ones(panorama.valid.shape, bool)
     placed = Panorama(panorama.rgb, distance, everywhere)  # what has no distance has a colour
     scene = lift(placed, level_pose(jnp.zeros(3)), everywhere, config=config.lift)

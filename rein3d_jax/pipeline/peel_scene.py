@@ -24,10 +24,12 @@ def peel_scene(
     scene, config = known.coarse, dataclasses.replace(stages.lift, snap_edges=False)
     if stages.peel.room and background is not None and stages.restore.method != "none":
         taken = without_things(known.panorama, background.shell, origin_pose(), rows=stages.restore.height)
-        layer, hidden = behind_things(taken, restore(taken, key), background.shell)
-        leaves = dataclasses.replace(config, max_leaf_side=min(config.max_leaf_side, _LEAF))
-        new = lift_adaptively(layer, origin_pose(), hidden, config=leaves)
-        scene, _ = joined_in(scene, new, grow=True)
+        _, hidden = behind_things(taken, taken, background.shell)
+        if hidden.any():  # in an empty room nothing is to be made up
+            layer, hidden = behind_things(taken, restore(taken, key), background.shell)
+            leaves = dataclasses.replace(config, max_leaf_side=min(config.max_leaf_side, _LEAF))
+            new = lift_adaptively(layer, origin_pose(), hidden, config=leaves)
+            scene, _ = joined_in(scene, new, grow=True)
     if stages.peel.outside:
         outside = outside_of(known.panorama, known.trajectories.positions.reshape(-1, 3))
         if outside.there:

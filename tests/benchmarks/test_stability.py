@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from benchmarks.stability import case, curve, given_distance, methods
+from benchmarks.stability import case, curve, given_distance, methods, needles, rendering, restoring
 from benchmarks.stability.__main__ import REGIMES, main
 from benchmarks.stability.regime import LARGE, OURS, SMALL, Figure, Regime
 from benchmarks.studies.box_room import HEIGHT, pattern, pose_at, true_panorama
@@ -15,7 +15,7 @@ from rein3d_jax.evaluate.regions import OBSERVED
 from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.lift import LiftConfig, lift
 from rein3d_jax.rasterize import Buffers, RasterizeConfig, allocate, rasterize
-from rein3d_jax.scene import Panorama
+from rein3d_jax.scene import Panorama, Video
 
 DECIBELS = Figure("psnr", "PSNR, dB", LARGE, 3.0)
 NEAR_WALL = np.array([1.7, 0.35, 0.0])  # 0.5 of the 2.2 metres to the wall ahead: four times nearer
@@ -76,6 +76,29 @@ def test_small_buffers_confess(room):
     needed = allocate(scene, [camera], config=RasterizeConfig(), slack=1.0)
     half = Buffers(*(size // 2 for size in needed))
     assert int(rasterize(scene, camera, config=RasterizeConfig(), buffers=half).overflow) > 0
+
+
+def test_seven_bits_are_bfloat16s():
+    x = jnp.asarray(np.random.default_rng(0).normal(size=1000) * 10.0 ** np.arange(-5, 5).repeat(100), jnp.float32)
+    np.testing.assert_array_equal(rendering._rounded(x, 7), x.astype(jnp.bfloat16).astype(jnp.float32))
+    np.testing.assert_array_equal(rendering._rounded(x, 23), x)
+
+
+def test_a_hole_grows_and_shrinks_by_a_rim():
+    """A hole of 3 x 3 pixels: of 5 x 5, and its middle alone."""
+    alpha = jnp.ones((1, 16, 32)).at[0, 6:9, 10:13].set(0.2)
+    video = Video(jnp.zeros((1, 16, 32, 3)), alpha, alpha, jnp.eye(4)[None])
+    holes = [int((restoring._widened(video, width).alpha < restoring.OBSERVED).sum()) for width in (-1, 0, 1)]
+    assert holes == [1, 9, 25]
+
+
+def test_the_picture_of_a_needle_says_which_way_it_points():
+    """A line through a picture of its own slope."""
+    middle, axis = np.array([2.0, -0.4, 0.1]), np.array([0.3, 0.8, 0.5])
+    steps = np.linspace(-0.3, 0.3, 2000)[:, None]
+    x, y, z = (middle + steps * axis).T
+    alpha, _, _ = np.histogram2d(-z / x, -y / x, bins=200, range=[[-0.7, 0.7], [-0.7, 0.7]])
+    assert needles._off(alpha, needles._slope(middle, axis)) < 0.5  # pixels of 0.4 degrees
 
 
 @pytest.mark.parametrize(

@@ -65,3 +65,11 @@ def test_layers_that_are_not_wanted_are_not_made(known):
 def test_a_small_buffer_grows(known):
     full = known.replace(coarse=r3d.lift.compact(known.coarse))
     assert int(peeled(full).alive.sum()) == int(peeled(known).alive.sum())
+
+
+def test_an_empty_room_asks_for_no_guess(known):
+    rays = pixel_rays(ROWS, 2 * ROWS)
+    empty = known.panorama.replace(distance=jnp.min(HALF / jnp.maximum(jnp.abs(rays), 1e-6), axis=-1))
+    background = room_background(empty, STAGES.restore)
+    scene = peel_scene(known.replace(panorama=empty), background, lambda *_: 1 / 0, KEY, stages=STAGES)
+    assert int(scene.alive.sum()) == int(known.coarse.alive.sum())
