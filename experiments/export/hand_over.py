@@ -9,15 +9,11 @@ from experiments.export.collider import run_collider
 from experiments.export.scene_files import write_gltf, write_mesh, write_scene, write_usd_scene
 from experiments.export.walk import floor_depth
 from experiments.run_folder import RunFolder
-from rein3d_jax.explore.trajectories import path_ends
-from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.io.files.atomic import write_bytes, write_text
 from rein3d_jax.io.files.input_file import require_file
 from rein3d_jax.io.meshes.named_meshes import write_named_meshes
 from rein3d_jax.io.splats.gaussian_file import write_splats
-from rein3d_jax.pipeline.stages import origin_pose
-from rein3d_jax.refine.prune import contribution, prune_to
-from rein3d_jax.scene import Gaussians
+from rein3d_jax.lift.detail_order import lighter_scene
 
 TARGETS = ("headset", "unity", "unreal", "blender", "isaac", "web")
 HEADSET_BUDGET = 500_000  # splats that a Quest 3 shows fast enough for both eyes
@@ -51,17 +47,8 @@ def _collider(run: RunFolder, folder: Path, options: argparse.Namespace) -> None
 
 
 def _light_scene(run: RunFolder, folder: Path, options: argparse.Namespace) -> None:
-    antialias = run.config.rasterize.antialias
-    write_splats(folder / "scene.sog", within_budget(run, HEADSET_BUDGET), antialias=antialias, up="y-down")
-
-
-def within_budget(run: RunFolder, count: int) -> Gaussians:
-    """The run's scene, or the `count` splats that add most to panoramas from the origin and the ends of the paths."""
-    if int(run.refined.alive.sum()) <= count:
-        return run.refined
-    poses = (origin_pose(), *path_ends(run.trajectories))
-    cameras = [equirectangular_camera(pose, len(run.panorama.rgb)) for pose in poses]
-    return prune_to(run.refined, contribution(run.refined, cameras, config=run.config.rasterize), count)
+    scene, antialias = lighter_scene(run.refined, HEADSET_BUDGET), run.config.rasterize.antialias
+    write_splats(folder / "scene.sog", scene, antialias=antialias, up="y-down")
 
 
 _PARTS: dict[str, tuple[_Part, ...]] = {

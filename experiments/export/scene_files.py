@@ -15,17 +15,20 @@ from rein3d_jax.io.splats.gaussian_file import write_splats
 from rein3d_jax.io.splats.gltf_splats import write_gltf_splats
 from rein3d_jax.io.splats.spz import write_spz
 from rein3d_jax.io.splats.up_axis import with_up
+from rein3d_jax.lift.detail_order import in_detail_order
 
 SCENES = ("ply", "compressed.ply", "spz", "sog", "splat")
+_PLAIN = ("ply", "splat")  # the others pack neighbours together: an SPZ in detail order is 45 % larger
 
 
 def write_scene(run: RunFolder, output: Path, suffix: str, options: argparse.Namespace) -> str:
-    """scene.SUFFIX, one of SCENES, in the axes `options.up`."""
+    """scene.SUFFIX, one of SCENES, in the axes `options.up`; in detail order where that costs no bytes."""
     path, antialias = output / f"scene.{suffix}", run.config.rasterize.antialias
+    scene = in_detail_order(run.refined) if suffix in _PLAIN else run.refined
     if suffix == "spz" and options.spz_version != 3:
-        write_spz(path, with_up(run.refined, options.up), antialias=antialias, version=options.spz_version)
+        write_spz(path, with_up(scene, options.up), antialias=antialias, version=options.spz_version)
     else:
-        write_splats(path, run.refined, antialias=antialias, up=options.up)
+        write_splats(path, scene, antialias=antialias, up=options.up)
     return size_told(path)
 
 
@@ -38,7 +41,7 @@ def write_mesh(run: RunFolder, output: Path, options: argparse.Namespace) -> str
 
 def write_gltf(run: RunFolder, output: Path, options: argparse.Namespace) -> str:
     """scene.glb, the splats, and mesh.glb, for what knows no splats."""
-    write_gltf_splats(output / "scene.glb", run.refined)
+    write_gltf_splats(output / "scene.glb", in_detail_order(run.refined))
     return f"{size_told(output / 'scene.glb')}\n{write_mesh(run, output, options)}"
 
 

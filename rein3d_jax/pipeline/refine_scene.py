@@ -5,22 +5,19 @@ from collections.abc import Iterator, Sequence
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from rein3d_jax.explore.hidden import in_doubt, on_observed
 from rein3d_jax.lift import compact
+from rein3d_jax.lift.detail_order import lighter_scene
 from rein3d_jax.parallel import data_mesh
 from rein3d_jax.pipeline.devices import steps_over
 from rein3d_jax.pipeline.stages import Stages, origin_pose
 from rein3d_jax.rasterize import bucket
 from rein3d_jax.refine import Snapshot, Views, first_snapshot, join_views, refine, views_from_panorama
-from rein3d_jax.refine.prune import contribution, prune_to
 from rein3d_jax.refine.step import take_step
-from rein3d_jax.refine.views import camera_of
 from rein3d_jax.scene import Gaussians, Panorama, Video
 
 _GOLDEN_ANGLE = 2.399963  # radians: successive multiples spread the cuts between a trajectory's views evenly
-_WEIGHED = 48  # views, evenly through the list, by which a scene is pruned
 
 
 def collect_views(panorama: Panorama, videos: Sequence[Video], *, stages: Stages) -> Views:
@@ -56,7 +53,7 @@ def refine_scene(
     """`refine`'s snapshots (paper Sec. 3.3) of the scene `start`, brought within its limits, or on from a snapshot."""
     config, raster = stages.refine, stages.rasterize
     if isinstance(start, Gaussians):
-        scene = _within_limits(start, views, stages)
+        scene = _within_limits(start, stages)
         sure = on_observed(panorama, scene.means) & ~in_doubt(panorama, scene.means)
         fixed = sure if config.freeze_observed else None
         extent = scene_extent(panorama)
@@ -65,14 +62,12 @@ def refine_scene(
     return refine(start, views, key, config=config, raster=raster, take_step=chosen)
 
 
-def _within_limits(scene: Gaussians, views: Views, stages: Stages) -> Gaussians:
-    """What the views need of the scene, `max_count` at most, in a buffer with room to grow. Buffers of rounded size:
-    the next scene's program is then compiled already."""
+def _within_limits(scene: Gaussians, stages: Stages) -> Gaussians:
+    """The scene with `max_count` Gaussians at most, in a buffer with room to grow. Buffers of rounded size: the next
+    scene's program is then compiled already."""
     limit = stages.refine.max_count
-    if 0 < limit < int(scene.alive.sum()):
-        chosen = np.unique(np.linspace(0, len(views.rgb) - 1, _WEIGHED).astype(int))
-        cameras = [camera_of(views, int(i)) for i in chosen]
-        scene = prune_to(scene, contribution(scene, cameras, config=stages.rasterize), limit)
+    if limit:
+        scene = lighter_scene(scene, limit)
     scene = compact(scene, capacity=bucket(int(int(scene.alive.sum()) * (1 + stages.refine.spare))))
     if 0 < limit < scene.alive.shape[0]:
         scene = jax.tree.map(lambda x: x[:limit], scene)  # the living come first

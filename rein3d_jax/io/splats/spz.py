@@ -5,8 +5,8 @@ positions in half floats.
 positions (24-bit fixed point)  opacity (u8)  colour (u8)  log scales (u8, 1/16)
 rotation (1 and 2: u8 x y z; 3 and 4: three of 10 bits and which is left out)  SH (5 and 4 bits)
 
-Axes: SPZ says that it holds right, up, back, and every converter makes it of a PLY (right, down, front) by flipping
-y and z. So does this file: converted to PLY by others, it is the scene.ply that ply.py writes, +Z up.
+Axes: the numbers are those of the PLY that ply.py writes, as most readers take them (experiments/README.md, "export",
+names them). SPZ's papers say right, up, back, which the axes `y` of up_axis.py are.
 """
 
 import warnings
@@ -24,9 +24,6 @@ from rein3d_jax.scene import Gaussians
 _FRACTIONAL_BITS = 12  # of the 24: 0.24 mm, and 2 km to either side
 _COLOUR_SCALE = 0.15  # 0.5 + 0.15 f_dc fills the byte
 _STEPS = 511 / np.sqrt(0.5)  # of a rotation's three smaller components, which are at most sqrt(0.5)
-_FLIP = np.array([1, -1, -1], np.float32)  # y and z
-# The sign of each SH basis function above degree 0 when y and z change theirs.
-_FLIP_REST = np.array([-1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1], np.float32)[:, None]
 
 
 def encode_spz(
@@ -39,14 +36,14 @@ def encode_spz(
     count, bits = len(c.means), _fractional_bits(c.means, name)
     if count > MAX_SPZ_GAUSSIANS:
         raise InputError(f"{name} has {count} Gaussians, more than the {MAX_SPZ_GAUSSIANS} of an SPZ file: write a PLY")
-    fixed = np.round(c.means.astype(np.float64) * _FLIP * 2**bits).astype("<i4")
+    fixed = np.round(c.means.astype(np.float64) * 2**bits).astype("<i4")
     blocks = [
         fixed[..., None].view(np.uint8)[..., :3],
         alpha_bytes(c.opacity_logits),
         _byte(255 * (0.5 + _COLOUR_SCALE * c.sh[:, 0])),
         _byte(16 * (c.log_scales + 10)),
-        _smallest_three(c.quats * [1, *_FLIP]),
-        _rest_bytes(c.sh[:, 1:] * _FLIP_REST[: c.sh.shape[1] - 1]),
+        _smallest_three(c.quats),
+        _rest_bytes(c.sh[:, 1:]),
     ]
     return pack_spz(SpzHeader(version, count, REST_COUNTS.index(c.sh.shape[1] - 1), bits, antialias), blocks)
 
@@ -65,11 +62,11 @@ def read_spz(path: str | Path) -> Gaussians:
         warnings.warn(f"{path} has SH degree {header.degree}, of which degrees 0 to 3 are read", stacklevel=3)
     rest = min(sh.shape[1] // 3, REST_COUNTS[-1])
     dc = ((colour / 255 - 0.5) / _COLOUR_SCALE)[:, None]
-    sh = (sh[:, : 3 * rest].reshape(header.count, rest, 3) / 128 - 1) * _FLIP_REST[:rest]
-    quats = (_quats_from_xyz if header.version < 3 else _quats_from_smallest_three)(rotation) * [1, *_FLIP]
+    sh = sh[:, : 3 * rest].reshape(header.count, rest, 3) / 128 - 1
+    quats = (_quats_from_xyz if header.version < 3 else _quats_from_smallest_three)(rotation)
     log_scales = scales / np.float32(16) - 10
     metres = _halves(means) if header.version == 1 else _fixed(means) / 2.0**header.bits
-    fields = (metres * _FLIP, log_scales, quats, alpha_logits(alpha[:, 0]), np.hstack([dc, sh]))
+    fields = (metres, log_scales, quats, alpha_logits(alpha[:, 0]), np.hstack([dc, sh]))
     return from_columns(Columns(*(field.astype(np.float32) for field in fields)), path)
 
 

@@ -28,7 +28,8 @@ _ROTATION_BYTES = {1: 3, 2: 3, 3: 4, 4: 4}
 _REST_COUNTS = (*REST_COUNTS, 24)
 _ANTIALIASED, _EXTENDED = 1, 2  # flags
 _MAX_EXTENSIONS = 1 << 16  # bytes
-_COORDINATES, _RIGHT_UP_BACK = 0xADBE0003, 4  # the extension SPZ_ADOBE_coordinate_system, and what all others hold
+_COORDINATES = 0xADBE0003  # the extension SPZ_ADOBE_coordinate_system: what axes the numbers are in
+_TAKEN_AS_THEY_ARE = (0, 4, 6)  # unspecified; right, up, back; right, down, front
 _DEFLATE_RATIO = 1032  # a deflate stream holds no more bytes for each of its own
 _ZSTD_RATIO = 10 * 1024  # the reference's loader has 1024 for a Gaussian's position, a tenth of the most that it takes
 _MEND = "convert it to .ply with `npx @playcanvas/splat-transform`"
@@ -147,8 +148,8 @@ def _checked_header(path: Path, numbers: list[int], flags: int, most: int) -> Sp
 def _check_axes(path: Path, records: bytes) -> None:
     while len(records) >= 8:
         kind, length = struct.unpack_from("<II", records)
-        if kind == _COORDINATES and int.from_bytes(records[8:12], "little") not in (0, _RIGHT_UP_BACK):
-            raise InputError(f"{path} says that it is not in SPZ's own axes (right, up, back): {_MEND}")
+        if kind == _COORDINATES and int.from_bytes(records[8:12], "little") not in _TAKEN_AS_THEY_ARE:
+            raise InputError(f"{path} is neither in SPZ's axes (right, up, back) nor in a PLY's: {_MEND}")
         records = records[8 + length :]
 
 

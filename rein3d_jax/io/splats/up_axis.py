@@ -1,8 +1,8 @@
 """Scenes in other axes than the world's: means, orientations and spherical harmonics rotated together.
 
 The world has +Z up. `y` has Y up: X stays, -Z is where +Y was, as glTF wants and mesh.glb is. `y-down` is `y` half a
-turn about Z, as the 3DGS paper's own scenes lie: SuperSplat, PlayCanvas and splat-transform turn PLY, SPZ and .splat by
-that half turn, and so show it upright and in mesh.glb's place.
+turn about Z, as the 3DGS paper's own scenes lie: SuperSplat, PlayCanvas and splat-transform turn PLY and .splat by that
+half turn, the first and the last SPZ too, and so show it upright and in mesh.glb's place.
 """
 
 import jax.numpy as jnp

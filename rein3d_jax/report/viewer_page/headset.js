@@ -39,9 +39,9 @@ for (const index of renderer ? [0, 1] : []) {
 // The floor: where most splats of the safe area lie, below the eyes, to 5 cm.
 function floorOf(mesh) {
   const shelves = new Map(), stride = Math.ceil(mesh.numSplats / 20_000);
-  mesh.forEachSplat((index, { x, y, z }) => { // in the file's frame
-    if (index % stride || z < 0.5 || !inside(data.safe, x, -y)) return;
-    const shelf = Math.round(-z * 20) / 20;
+  mesh.forEachSplat((index, { x, y, z }) => {
+    if (index % stride || z > -0.5 || !inside(data.safe, x, y)) return;
+    const shelf = Math.round(z * 20) / 20;
     shelves.set(shelf, (shelves.get(shelf) ?? 0) + 1);
   });
   return [...shelves].reduce((best, each) => (each[1] > best[1] ? each : best), [-1.5, 0])[0];

@@ -46,7 +46,6 @@ async function splats(spz, url) {
   const fileBytes = url ? await fetched(url) : bytes(spz);
   byId("bar").removeAttribute("value"); // Spark does not say how far it is
   const mesh = new libraries.SplatMesh({ fileBytes, fileType: libraries.SplatFileType.SPZ, extSplats: true });
-  mesh.quaternion.set(1, 0, 0, 0); // an SPZ file holds y and z flipped: half a turn about x
   await mesh.initialized;
   return mesh;
 }

@@ -156,7 +156,7 @@ def test_doubt_is_shown_where_there_is_any(run):
     assert "third picture is doubt" in page and "for 50% of the panorama" in page
 
 
-def test_a_page_that_would_be_too_large_shows_the_refined_scene_alone_and_of_it_what_adds_most(run, monkeypatch):
+def test_a_page_that_would_be_too_large_shows_a_lighter_refined_scene_alone(run, monkeypatch):
     whole = viewer_page(run)
     assert {"Coarse", "Refined"} <= set(re.findall(r'"name": "(\w+)"', whole))
     monkeypatch.setattr(viewer, "_LARGEST", 20_000)

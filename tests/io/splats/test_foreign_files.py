@@ -163,7 +163,7 @@ def test_a_compressed_ply_with_crlf(tmp_path):
 
 def test_spz_of_version_1(tmp_path):
     got = arrays(read(tmp_path, spz_1(), "spz"))
-    np.testing.assert_array_equal(got["means"], [[1, -2, -3], [-0.5, -0.25, -100]])  # y and z are flipped, as in 2
+    np.testing.assert_array_equal(got["means"], [[1, 2, 3], [-0.5, 0.25, 100]])
     assert got["sh"].shape == (2, 1, 3) and np.isfinite(got["quats"]).all()
 
 

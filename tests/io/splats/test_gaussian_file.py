@@ -1,5 +1,5 @@
-"""Each scene format: what is read is what was written within the format's steps; @playcanvas/splat-transform 2.7.1
-reads ours as we mean it, and we read its own; bad files are refused by name.
+"""Each scene format: what is read is what was written within the format's steps; @playcanvas/splat-transform (2.7.1;
+3.7.0 of SPZ, whose axes it turned before) reads ours as we mean it, and we read its own; bad files are refused by name.
 
 splat_transform/ holds scene.ply (seven Gaussians, degree 3), ours.* (our files of it), ours.*.read.ply (what
 splat-transform made of them) and theirs.* (what it made of scene.ply; the SPZ with --spz-version 3).
@@ -20,7 +20,7 @@ import plyfile
 import pytest
 
 from rein3d_jax.errors import InputError
-from rein3d_jax.geometry.spherical_harmonics import C0, basis
+from rein3d_jax.geometry.spherical_harmonics import C0
 from rein3d_jax.io.splats import spz, spz_streams
 from rein3d_jax.io.splats.gaussian_columns import alive_columns
 from rein3d_jax.io.splats.gaussian_file import read_splats, write_splats
@@ -147,7 +147,7 @@ def test_we_read_what_splat_transform_writes(name):
 
 
 @pytest.mark.skipif(
-    not shutil.which("splat-transform"), reason="npm install --global @playcanvas/splat-transform@2.7.1"
+    not shutil.which("splat-transform"), reason="npm install --global @playcanvas/splat-transform@3.7.0"
 )
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_splat_transform_reads_a_larger_scene(tmp_path, suffix):
@@ -192,11 +192,15 @@ def test_a_chunk_without_colour_bounds_is_read(tmp_path):
     np.testing.assert_allclose(rgb, [1, 0, 0.2], atol=1e-6)
 
 
-def test_spz_flips_spherical_harmonics_as_it_flips_axes():
-    rays = np.random.default_rng(0).standard_normal((50, 3))
-    rays = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).astype(np.float32)
-    flipped = np.asarray(basis(rays * spz._FLIP, 16))[:, 1:]
-    np.testing.assert_allclose(flipped, np.asarray(basis(rays, 16))[:, 1:] * spz._FLIP_REST[:, 0], atol=1e-6)
+@pytest.mark.parametrize("version", [3, 4])
+def test_an_spz_holds_a_ply_s_numbers(tmp_path, version):
+    """The header aside, its first bytes are x y z in 1/4096 m, unpacked by hand: no axis is turned."""
+    wanted = scene(1)
+    spz.write_spz(tmp_path / "x.spz", wanted, version=version)
+    _, (fixed, *_) = spz_streams.unpack_spz(tmp_path / "x.spz")
+    low, middle, high = (fixed[:, byte::3].astype(int) for byte in range(3))
+    metres = (low + 256 * middle + 65536 * np.where(high < 128, high, high - 256)) / 4096
+    np.testing.assert_allclose(metres, wanted.means, atol=0.5 / 4096 + TINY)
 
 
 @pytest.mark.parametrize("far", [1500.0, 100_000.0, 8_000_000.0])
