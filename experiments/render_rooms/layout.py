@@ -15,7 +15,7 @@ from experiments.render_rooms.shell import Face, shell_faces
 from experiments.render_rooms.styles import STYLES, furnish
 from experiments.render_rooms.viewpoints import draw_viewpoints, draw_walk
 
-_TEXTURE_CREDIT = ("Textures", "Emmanuel Puybaret / eTeks", "Sweet Home 3D default textures", "GPL-2+ or CC-BY 3.0")
+_TEXTURE_CREDIT = ("Textures", "Emmanuel Puybaret / eTeks", "Sweet Home 3D default textures", "GPL-2.0 or later")
 _WORLD_CREDIT = ("Surroundings", "Poly Haven, by way of Blender", "Blender studio lights", "CC0")
 
 

@@ -27,6 +27,7 @@ class DepthConfig(CompleteConfig):
     method: str = setting(
         "network", "of a picture without distance: by the trained network, or an empty box", among=("network", "shell")
     )
+    weights: str | None = setting(None, "folder of the network that train_depth wrote; none for the packaged one")
 
 
 @struct.dataclass

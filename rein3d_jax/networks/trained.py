@@ -45,7 +45,7 @@ def weights_fingerprint(config: RestoreConfig) -> str:
 def files_digest(path: Path) -> str:
     """Hash of a weights file, or of a folder's safetensors. Raises InputError where there is none."""
     if not path.exists():
-        raise InputError(f"{path} is not there: the weights do not come with this version")
+        raise InputError(f"{path} is not there: name a file or a folder of weights")
     digest = hashlib.sha256()
     for file in sorted(path.rglob("*.safetensors")) if path.is_dir() else [path]:
         with open(file, "rb") as content:

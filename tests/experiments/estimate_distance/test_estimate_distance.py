@@ -80,6 +80,11 @@ def test_a_picture_that_leaned_is_levelled_and_written_beside_its_distance(estim
     assert np.abs(floor_of(metres) / 1.6 - 1).max() < 0.03 < np.abs(floor_of(distance) / 1.6 - 1).max()
 
 
+def test_weights_that_are_none_are_refused_by_name(estimate, capsys):
+    assert estimate("depth.weights=nowhere/weights") == 2
+    assert "nowhere/weights is no folder" in capsys.readouterr().err
+
+
 def floor_of(distance):
     """Metres below the camera of what a map shows in its lowest rows."""
     height = len(distance)
