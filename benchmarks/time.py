@@ -2,10 +2,10 @@
 
 CPU seconds (user and system) of each, wall seconds, seconds until viewer.html is first there, and by stage how much
 went into tracing, compiling and the work itself; medians over rounds. `--beside` runs another checkout of the project
-in turn, `--rows` a photo at several sizes.
+in turn, `--rows` a photo at several sizes, with the slopes of what grows.
 
     python -m benchmarks.time --json benchmarks/results/time.json [--recipes quick,draft] [--beside FOLDER]
-    python -m benchmarks.time --photo pano.jpg --rows 128,256,512,1024 --json FILE
+    python -m benchmarks.time --photo pano.jpg --rows 128,256,512,1024 --json benchmarks/results/growth.json
 """
 
 import json
@@ -18,11 +18,15 @@ import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
+
 from experiments.command import CommandParser
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
 
 HERE = Path(__file__).resolve().parents[1]
+RUNS = ("first", "second")  # on a machine
+GROWING = ("cpu_s", "peak_bytes", "viewer_bytes")
 _LOOK = 0.1  # seconds between looks for viewer.html
 
 
@@ -45,9 +49,11 @@ def run_job(project: Path, cache: Path, *arguments: str) -> dict:
         if process.returncode:
             raise RuntimeError(process.stdout.read())
         metrics = json.loads((output / "metrics.json").read_text())
+        viewer = (output / "viewer.html").stat().st_size
     cpu = sum(getattr(after, of) - getattr(before, of) for of in ("ru_utime", "ru_stime"))
     found = {"cpu_s": cpu, "wall_s": wall, "first_viewer_s": wall if seen is None else seen}
-    found |= {"peak_bytes": metrics["peak_bytes"], "gaussians": metrics["count"]["refined"]}
+    found |= {"gaussians": metrics["count"]["refined"], "viewer_bytes": viewer}
+    found |= {of: metrics[of] for of in ("peak_bytes", "foreseen_bytes") if of in metrics}
     found |= {"psnr": metrics["quality"]["refined"]["psnr"]} if "quality" in metrics else {}
     return found | {"stages": _by_stage(metrics), "foreseen_s": metrics.get("foreseen_seconds", {}).get("total")}
 
@@ -59,15 +65,15 @@ def _by_stage(metrics: dict) -> dict[str, dict[str, float]]:
     return {stage: {part: of[stage] for part, of in parts.items() if stage in of} for stage in metrics["seconds"]}
 
 
-def measure(projects: dict[str, Path], jobs: dict[str, list[str]], rounds: int) -> dict:
-    """{project: {job: {"first", "second"}}}: medians over rounds, the projects in turn; a round's first job of each
-    kind begins with an empty cache."""
-    found: dict = {name: {job: {"first": [], "second": []} for job in jobs} for name in projects}
+def measure(projects: dict[str, Path], jobs: dict[str, list[str]], rounds: int, runs: tuple[str, ...] = RUNS) -> dict:
+    """{project: {job: {run}}}: medians over rounds, the projects in turn; a round's first job of each kind begins with
+    an empty cache."""
+    found: dict = {name: {job: {run: [] for run in runs} for job in jobs} for name in projects}
     for _ in range(rounds):
         for job, arguments in jobs.items():
             for name, project in projects.items():
                 with tempfile.TemporaryDirectory() as cache:
-                    for turn in ("first", "second"):
+                    for turn in runs:
                         row = run_job(project, Path(cache), *arguments)
                         found[name][job][turn].append(row)
                         print(f"{name:10} {job:14} {turn:7} {_line(row)}", flush=True)
@@ -75,7 +81,8 @@ def measure(projects: dict[str, Path], jobs: dict[str, list[str]], rounds: int) 
 
 
 def _line(row: dict) -> str:
-    return f"{row['cpu_s']:6.1f} CPU s, {row['wall_s']:6.1f} s, first viewer after {row['first_viewer_s']:5.1f} s"
+    took = f"{row['cpu_s']:6.1f} CPU s, {row['wall_s']:6.1f} s, first viewer after {row['first_viewer_s']:5.1f} s"
+    return f"{took}, {row['peak_bytes'] / 1e9:.1f} GB, {row['gaussians']:,.0f} Gaussians"
 
 
 def _median(rows: list[dict]) -> dict:
@@ -83,6 +90,18 @@ def _median(rows: list[dict]) -> dict:
     if isinstance(rows[0], dict):
         return {key: _median([row[key] for row in rows]) for key in rows[0]}
     return None if rows[0] is None else round(statistics.median(rows), 4)
+
+
+def growth(by_rows: dict[int, dict]) -> dict[str, float]:
+    """What grows with the pixels, and with the Gaussians: slopes of straight lines through the logarithms."""
+    pixels, rows = [2.0 * number**2 for number in by_rows], list(by_rows.values())
+    gaussians = [row["gaussians"] for row in rows]
+
+    def slope(of: str, against: list[float]) -> float:
+        return round(float(np.polyfit(np.log(against), np.log([row[of] for row in rows]), 1)[0]), 3)
+
+    with_pixels = {f"{of} / pixels": slope(of, pixels) for of in (*GROWING, "gaussians")}
+    return with_pixels | {f"{of} / gaussians": slope(of, gaussians) for of in GROWING}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -93,6 +112,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--beside", metavar="FOLDER", help="another checkout of the project, run in turn")
     parser.add_argument("--photo", metavar="FILE", help="instead of the recipes: quick with this panorama, by --rows")
     parser.add_argument("--rows", default="128,256,512,1024", metavar="A,B", help="working rows (default: %(default)s)")
+    parser.add_argument("--runs", type=int, default=2, choices=(1, 2), help="1 leaves the second of each job out")
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
     return parser.run(_run, arguments)
 
@@ -105,15 +125,23 @@ def _run(options) -> None:
         photo = ["--input", str(Path(options.photo).resolve()), "--set"]
         jobs = {f"{rows} rows": [*photo, f"input.height={rows}"] for rows in options.rows.split(",")}
     projects = {"this": HERE} | ({"beside": Path(options.beside)} if options.beside else {})
-    found = measure(projects, jobs, options.rounds)
+    found = measure(projects, jobs, options.rounds, RUNS[: options.runs])
     for name, of_jobs in found.items():
         for job, turns in of_jobs.items():
             for turn, row in turns.items():
                 print(f"{name:10} {job:14} {turn:7} {_line(row)}")
+    report = {"cores": os.cpu_count(), "rounds": options.rounds} | found
+    if options.photo and len(jobs) > 1:
+        report["slopes"] = {name: _growth(of_jobs) for name, of_jobs in found.items()}
+        print(json.dumps(report["slopes"], indent=1))
     if options.json:
-        write_text(
-            Path(options.json), json.dumps({"cores": os.cpu_count(), "rounds": options.rounds} | found, indent=1) + "\n"
-        )
+        write_text(Path(options.json), json.dumps(report, indent=1) + "\n")
+
+
+def _growth(of_jobs: dict) -> dict:
+    """By run."""
+    runs = next(iter(of_jobs.values()))
+    return {run: growth({int(job.split()[0]): turns[run] for job, turns in of_jobs.items()}) for run in runs}
 
 
 if __name__ == "__main__":

@@ -38,6 +38,7 @@ class Photo:
     rgb: np.ndarray  # (h, 2 h, 3) sRGB in [0, 1], black where not seen
     seen: np.ndarray  # (h, 2 h) bool
     pose: Pose  # as the file tells it
+    rows: int  # `panorama_rows` of the file
 
 
 def read_photo(path: str | Path) -> Photo:
@@ -54,7 +55,7 @@ def read_photo(path: str | Path) -> Photo:
         spec = image.spec()
         crop = _checked_crop(path, spec)
         rgb, seen = _colours(path, image, WORKING_COLUMNS)
-        pose = pose_of(spec)
+        pose, told = pose_of(spec), _rows(spec, crop)
     if crop is not None:
         rgb, seen = (_placed(x, crop, spec.width) for x in (rgb, seen))
     rows = min(len(rgb), rgb.shape[1] // 2)
@@ -64,16 +65,19 @@ def read_photo(path: str | Path) -> Photo:
     if wrong := what_it_shows(rgb):
         raise InputError(f"{path} is no panorama but looks like {wrong}")
     seen &= ~_black_caps(rgb)
-    return Photo(np.where(seen[..., None], rgb, np.float32(0)), seen, pose)
+    return Photo(np.where(seen[..., None], rgb, np.float32(0)), seen, pose, told)
 
 
 def panorama_rows(path: str | Path) -> int:
     """The rows of the equirectangular picture in a file, by its header. Raises InputError as `read_photo` does."""
     with open_image(Path(path)) as image:
         spec = image.spec()
-        crop = _checked_crop(Path(path), spec)
-        width, height = (spec.width, spec.height) if crop is None else (crop.width, crop.height)
-        return min(height, width // 2) // -(-spec.width // WORKING_COLUMNS)
+        return _rows(spec, _checked_crop(Path(path), spec))
+
+
+def _rows(spec: oiio.ImageSpec, crop: Crop | None) -> int:
+    width, height = (spec.width, spec.height) if crop is None else (crop.width, crop.height)
+    return min(height, width // 2) // -(-spec.width // WORKING_COLUMNS)
 
 
 def _colours(path: Path, image: oiio.ImageInput, columns: int) -> tuple[np.ndarray, np.ndarray]:

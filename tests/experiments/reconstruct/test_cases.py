@@ -15,6 +15,8 @@ import pytest
 from experiments.reconstruct.inputs import InputConfig, told_panorama
 from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.colour import srgb_from_linear
+from rein3d_jax.io.pictures import photo
+from rein3d_jax.io.pictures.decode import open_image
 from rein3d_jax.io.pictures.distance import read_distance
 from rein3d_jax.io.pictures.photo import read_photo, read_rgb
 
@@ -81,6 +83,14 @@ def test_what_a_picture_does_not_show_is_told_and_not_black(name):
     unseen = ~read_photo(CASES / name).seen
     assert unseen.any() and "takes the colours around" in told
     assert np.asarray(panorama.rgb)[unseen].max(axis=-1).min() > 0.1
+
+
+def test_a_picture_is_opened_once(monkeypatch):
+    """To open a progressive JPEG is to decode all of it."""
+    opened = []
+    monkeypatch.setattr(photo, "open_image", lambda path: opened.append(path.name) or open_image(path))
+    taken("jpeg_progressive.jpg")
+    assert opened == ["jpeg_progressive.jpg"]
 
 
 @pytest.mark.parametrize("name", REFUSED)
