@@ -35,10 +35,19 @@ def load_config(cls: type[Config], recipe: str | Path, overrides: Sequence[str] 
 
 def config_from(cls: type[Config], table: Mapping, overrides: Sequence[str] = ()) -> Config:
     """The same of a table."""
+    return _laid_over(cls, table, overrides, None)
+
+
+def changed(config: Config, overrides: Sequence[str]) -> Config:
+    """The config with each override "stage.key=value" laid over it in turn. Raises InputError as load_config does."""
+    return _laid_over(type(config), {}, overrides, config)
+
+
+def _laid_over(cls: type[Config], table: Mapping, overrides: Sequence[str], base: Config | None) -> Config:
     for override in overrides:
         table = _merge(table, _override(override))
     _refuse_unknown(cls, table, "", list(_known_keys(cls)))
-    return _build(cls, table, "")
+    return _build(cls, table, "", base)
 
 
 def dump_config(config: Any) -> str:

@@ -11,7 +11,19 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_bytes, write_text
 from rein3d_jax.io.files.json_file import read_json
 
-_COLOURS = ("#1f7a8c", "#c8553d", "#6a5acd", "#8a7a2a", "#2d6a4f", "#b5179e", "#555b6e", "#e09f3e")
+_UNITS = {"gaussians": 1e-3, "bytes": 1e-6}
+_COLOURS = (
+    "#1f7a8c",
+    "#c8553d",
+    "#6a5acd",
+    "#8a7a2a",
+    "#2d6a4f",
+    "#b5179e",
+    "#555b6e",
+    "#e09f3e",
+    "#118ab2",
+    "#a44a3f",
+)
 
 
 @dataclass(frozen=True)
@@ -28,10 +40,17 @@ class Panel:
 
 
 SECONDS, GAUSSIANS = "seconds from the panorama, log scale", "Gaussians, thousands"
+CPU_SECONDS, MEGABYTES = "the processor's seconds, whole job, log scale", "megabytes of scene.ply, log scale"
 PANELS = (
     Panel("novel_views", "seconds", "psnr", "Novel views", SECONDS, "PSNR, dB"),
     Panel("novel_views", "gaussians", "psnr", "Novel views", GAUSSIANS, "PSNR, dB"),
     Panel("novel_views", "seconds", "lpips", "Novel views", SECONDS, "LPIPS, less is better", more_is_better=False),
+    Panel("novel_views", "cpu_seconds", "psnr", "Novel views", CPU_SECONDS, "PSNR, dB"),
+    Panel("novel_views", "bytes", "psnr", "Novel views", MEGABYTES, "PSNR, dB"),
+    Panel("novel_views", "cpu_seconds", "psnr_disoccluded", "Novel views", CPU_SECONDS, "PSNR of what was hidden, dB"),
+    Panel("novel_views", "bytes", "psnr_disoccluded", "Novel views", MEGABYTES, "PSNR of what was hidden, dB"),
+    Panel("novel_views", "cpu_seconds", "lpips", "Novel views", CPU_SECONDS, "LPIPS, less is better", False),
+    Panel("novel_views", "bytes", "lpips", "Novel views", MEGABYTES, "LPIPS, less is better", False),
     Panel("restoration", "seconds", "psnr_hole", "Restored clips", SECONDS, "PSNR within holes, dB"),
 )
 
@@ -121,7 +140,7 @@ def _png(panels: list[tuple[Panel, list[Point]]], rooms: int) -> bytes:
 
 
 def _draw(axis, panel: Panel, points: list[Point], colours: dict[str, str]) -> None:
-    unit = 1e-3 if panel.cost == "gaussians" else 1.0
+    unit = _UNITS.get(panel.cost, 1.0)
     front = sorted((p for p in points if p.on_front), key=lambda p: p.cost)
     axis.plot([unit * p.cost for p in front], [p.merit for p in front], color="0.6", lw=1.2, zorder=1)
     for point in points:
@@ -131,7 +150,7 @@ def _draw(axis, panel: Panel, points: list[Point], colours: dict[str, str]) -> N
         edge = {"edgecolor": "black", "linewidth": 1.6} if point.on_front else {"edgecolor": colour}
         axis.scatter(*place, color=colour, s=60, zorder=3, **edge)
     axis.set(title=f"{panel.title}: {panel.merit_label}", xlabel=panel.cost_label, ylabel=panel.merit_label)
-    if panel.cost == "seconds":
+    if panel.cost != "gaussians":
         axis.set_xscale("log")
         for which in (axis.xaxis.set_major_formatter, axis.xaxis.set_minor_formatter):
             which("{x:g}")

@@ -1,16 +1,13 @@
 """What a scene may take: Gaussians, bytes of scene.ply, seconds. The stages then model no more than that."""
 
 import dataclasses
-import time
 from dataclasses import dataclass
 
 from rein3d_jax.errors import InputError
 from rein3d_jax.pipeline.stages import Stages
 from rein3d_jax.settings import Settings, setting
 
-OUT_OF_TIME = "the budget's seconds were spent"
 _BYTES, _BYTES_OF_A_PIXEL = 2_200_000_000, 2_000
-_EXPLORED, _REFINED = 0.6, 0.9  # shares of the seconds after which no path is begun, and refinement ends
 
 
 @dataclass(frozen=True)
@@ -19,7 +16,9 @@ class BudgetConfig(Settings):
 
     gaussians: int = setting(0, "Gaussians of the scene", within="[0, inf)")
     bytes: int = setting(0, "of scene.ply", within="[0, inf)", unit="bytes")
-    seconds: float = setting(0.0, "of the job but for its writing; what was begun is finished", within="[0, inf)")
+    seconds: float = setting(
+        0.0, "of the whole job: chooses the best plan that is foreseen to keep to them (plans.py)", within="[0, inf)"
+    )
     tolerance: float = setting(
         0.0, "that refinement may leave unreached: it stops where evaluations bring less", within="[0, inf)", unit="dB"
     )
@@ -31,7 +30,7 @@ def bytes_of_one(sh_degree: int) -> int:
 
 
 def within(stages: Stages, budget: BudgetConfig) -> Stages:
-    """The stages with the limits of `budget` laid over their own; the clock apart."""
+    """The stages with the limits of `budget` laid over their own; the seconds apart (plans.py)."""
     refine = stages.refine
     limits = [refine.max_count, budget.gaussians, budget.bytes // bytes_of_one(refine.sh_degree)]
     if 0 < budget.bytes < bytes_of_one(refine.sh_degree):
@@ -55,22 +54,3 @@ def check_memory(rows: int, available: int) -> None:
     mend = f"set input.height = {fits}" if fits else "take a machine with more"
     needed, has = (f"{x / 1e9:.1f} GB" for x in (foreseen_bytes(rows), available))
     raise InputError(f"{2 * rows} x {rows} pixels take about {needed} of memory, and there are {has}: {mend}")
-
-
-class Clock:
-    """Starts when made, and says when the budget's seconds are spent; a budget without seconds never is."""
-
-    def __init__(self, budget: BudgetConfig):
-        self.started, self.seconds = time.perf_counter(), budget.seconds
-
-    def elapsed(self) -> float:
-        """Seconds."""
-        return time.perf_counter() - self.started
-
-    def explored(self) -> bool:
-        """Whether no further path should be begun."""
-        return self.seconds > 0 and self.elapsed() > _EXPLORED * self.seconds
-
-    def refined(self) -> bool:
-        """Whether refinement should end."""
-        return self.seconds > 0 and self.elapsed() > _REFINED * self.seconds

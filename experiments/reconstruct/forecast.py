@@ -10,6 +10,7 @@ import hashlib
 import json
 import time
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 import jax
@@ -20,7 +21,8 @@ from experiments.reconstruct.diffusion_cost import restore_seconds
 from experiments.reconstruct.inputs import InputConfig
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
-from rein3d_jax.upsample import LEARNED
+from rein3d_jax.restore.restorer import DIFFUSION
+from rein3d_jax.upsample import LEARNED, NONE
 
 COUNTED = ("read", "lift", "explore", "peel", "restore", "refine", "write")
 # Seconds for programs, compiled and kept.
@@ -36,6 +38,7 @@ class SecondsForecast:
 
     def __init__(self, config: ReconstructConfig, rows: int, *, upsampled: bool):
         self.work, self.keys = _work(config, rows, upsampled=upsampled), _keys(config, rows, upsampled=upsampled)
+        self.workers = _workers(config, upsampled=upsampled)
         self.looks = 1.5 if config.input.distance is None else 1.0  # the network's programs are read's, too
         folder = jax.config.jax_compilation_cache_dir
         self.file = None if folder is None else Path(folder) / "seconds.json"
@@ -52,21 +55,21 @@ class SecondsForecast:
         """Keeps what a whole job took by stage, and how much of that for tracing and for compiling."""
         if self.file is None:
             return
-        slowness, kept, found = self._slowness(), self._programs(_KEPT), dict(self.known)
+        kept, found = self._programs(_KEPT), dict(self.known)
         for stage, key in self.keys.items():
             made = sum(of[stage] for of in programs.values())
             if 2 * made < seconds[stage]:  # or what is left between two threads' compilers says little
-                slowness[stage] = (seconds[stage] - made) / self.work[stage]
+                found[self.workers[stage]] = (seconds[stage] - made) / self.work[stage]
             # What was compiled now is read the next time.
             found[key] = kept[stage] if programs["compile"][stage] > kept[stage] + 0.5 else made
         with suppress(InputError):  # a full disk may not undo a finished job
-            write_text(self.file, json.dumps(found | slowness))
+            write_text(self.file, json.dumps(found))
 
     def _slowness(self) -> dict[str, float]:
-        """Of this machine, by stage, against the model's."""
-        if all(stage in self.known for stage in COUNTED):
-            return {stage: self.known[stage] for stage in COUNTED}
-        return dict.fromkeys(COUNTED, _calibration() / _CALIBRATED)
+        """Of who works in each stage on this machine, against the model's; by calibration until a job has told."""
+        known = {stage: self.known.get(worker) for stage, worker in self.workers.items()}
+        otherwise = _calibration() / _CALIBRATED if None in known.values() else 1.0
+        return {stage: otherwise if slowness is None else slowness for stage, slowness in known.items()}
 
     def _programs(self, table: dict[str, float]) -> dict[str, float]:
         return table | {"read": self.looks * table["read"]}
@@ -95,15 +98,29 @@ def _work(config: ReconstructConfig, rows: int, *, upsampled: bool) -> dict[str,
 
 def _keys(config: ReconstructConfig, rows: int, *, upsampled: bool) -> dict[str, str]:
     """What each stage's programs depend on, hashed: the sizes and settings, not which picture it is."""
-    plain = dataclasses.replace(config, input=InputConfig(), output="", seed=0)
+    budget = dataclasses.replace(config.budget, seconds=0.0)
+    plain = dataclasses.replace(config, input=InputConfig(), output="", seed=0, budget=budget)
     of_input = dataclasses.replace(config.input, panorama="", distance=config.input.distance and "given", views=None)
     depends = {stage: (jax.__version__, rows, plain) for stage in COUNTED}
     depends["read"] = (jax.__version__, rows, upsampled, of_input, config.depth, config.shell)
-    return {s: f"{s} {hashlib.sha256(repr(on).encode()).hexdigest()[:16]}" for s, on in depends.items()}
+    return {stage: f"{stage} {_hash(on)}" for stage, on in depends.items()}
+
+
+def _workers(config: ReconstructConfig, *, upsampled: bool) -> dict[str, str]:
+    """Who does each stage's work, hashed: a machine that is slow for a small network need not be for a large one."""
+    by_diffusion = config.restore.method == DIFFUSION
+    restorer = (config.restore.method, config.restore.diffusion.network if by_diffusion else None)
+    who = dict.fromkeys(COUNTED) | {"restore": restorer, "peel": restorer if config.peel.room else None}
+    who["read"] = (config.input.distance is None, config.input.upsample if upsampled else NONE)
+    return {stage: f"{stage} by {_hash(worker)}" for stage, worker in who.items()}
+
+
+def _hash(of) -> str:
+    return hashlib.sha256(repr(of).encode()).hexdigest()[:16]
 
 
 def recalled(file: Path) -> dict[str, float]:
-    """What a `SecondsForecast` kept: slowness by stage, seconds for programs by stage and hash; {} for no such file."""
+    """What a `SecondsForecast` kept: slowness by stage and worker, seconds for programs; {} for no such file."""
     try:
         found = json.loads(file.read_text("utf-8"))
         return found if all(isinstance(number, float) for number in found.values()) else {}
@@ -111,8 +128,9 @@ def recalled(file: Path) -> dict[str, float]:
         return {}  # nothing is kept yet, or by another version
 
 
+@cache
 def _calibration() -> float:
-    """Seconds of a little work of the kind that jobs do."""
+    """Seconds of a little work of the kind that jobs do; measured once, that forecasts of one job be comparable."""
     numbers, started = np.linspace(0, 1e4, 1 << 20, dtype=np.float32), time.perf_counter()
     for _ in range(16):
         np.sort(np.sin(numbers))

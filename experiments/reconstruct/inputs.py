@@ -128,18 +128,16 @@ def told_panorama(config: InputConfig, upsampler: dict | None = None) -> tuple[P
     return panorama, "; ".join(filter(None, (missing, converted, scaled))), lean
 
 
-def working_rows(config: InputConfig) -> int:
-    """Rows that the job will work at. Raises InputError as `read_rgb` does for a picture's header."""
-    path = resolve(config.panorama)
-    require_file(path)
-    return config.rows(panorama_rows(path))
+def picture_rows(config: InputConfig) -> int:
+    """Rows of the picture as it is in its file. Raises InputError as `read_photo` does for its header."""
+    return panorama_rows(resolve(config.panorama))
 
 
 def _picture(path: Path, config: InputConfig, upsampler: dict | None) -> tuple[jax.Array, Pose, str]:
     """The picture (h, 2 h, 3) at the rows to work at, the pose that its file tells, and what of it was made up."""
-    rows, photo = panorama_rows(path), read_photo(path)
-    rgb = jnp.asarray(whole_colours(photo, config.own_rows(rows)))
-    for _ in range(config.doublings(rows)):
+    photo = read_photo(path)
+    rgb = jnp.asarray(whole_colours(photo, config.own_rows(photo.rows)))
+    for _ in range(config.doublings(photo.rows)):
         rgb = upsample_picture(rgb, config.upsample, upsampler)
     return rgb, photo.pose, _made_up(photo)
 

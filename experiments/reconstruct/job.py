@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 import importlib.metadata
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -13,13 +14,14 @@ import numpy as np
 
 from experiments.config import dump_config
 from experiments.machine import machine_bytes
-from experiments.reconstruct.budget import OUT_OF_TIME, Clock, check_memory, foreseen_bytes, within
+from experiments.reconstruct.budget import check_memory, foreseen_bytes, within
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.diffusion_cost import restore_bytes, told_cost
 from experiments.reconstruct.forecast import SecondsForecast
-from experiments.reconstruct.inputs import input_fingerprint, input_views, levelled_views, told_panorama, working_rows
+from experiments.reconstruct.inputs import input_fingerprint, input_views, levelled_views, picture_rows, told_panorama
 from experiments.reconstruct.outputs import write_outputs
 from experiments.reconstruct.pages.first_look import write_first_look
+from experiments.reconstruct.plans import planned
 from experiments.reconstruct.progress import Progress
 from experiments.reconstruct.run import Run
 from experiments.reconstruct.stage_store import StageStore
@@ -32,10 +34,10 @@ from rein3d_jax.networks.trained import files_digest, read_network, require_netw
 from rein3d_jax.networks.upsampler import read_upsampler, upsampler_fingerprint
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
 from rein3d_jax.pipeline.peel_scene import peel_scene
-from rein3d_jax.pipeline.reconstruct import ALL_PATHS, Reconstruction, joined
+from rein3d_jax.pipeline.reconstruct import Reconstruction, joined
 from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene, where_it_pays
 from rein3d_jax.pipeline.survey import Survey, lift_scene, room_background, survey, with_distance
-from rein3d_jax.refine import Snapshot, evaluate_held_out
+from rein3d_jax.refine import Snapshot
 from rein3d_jax.restore import restorer
 from rein3d_jax.upsample import NONE, then_upsample
 
@@ -47,9 +49,9 @@ class _Job:
     """What its stages share."""
 
     config: ReconstructConfig
+    of_picture: int  # rows, in its file
     store: StageStore
     progress: Progress
-    clock: Clock
 
     def stage(self, name: str, depends, make):
         """The result of a stage, shown to whoever watches."""
@@ -74,26 +76,35 @@ class _Job:
 
 def run_job(config: ReconstructConfig, *, resume: bool = False) -> dict:
     """Run the job; returns what metrics.json holds. Raises InputError for whatever is wrong with the input."""
-    clock, output = Clock(config.budget), Path(config.output)
+    started, output = time.perf_counter(), Path(config.output)
     views = input_views(config.input)  # a bad view is found before the long part, and so are bad weights
     require_network(config.restore)
-    rows = working_rows(config.input)
+    of_picture = picture_rows(config.input)
+    config, plan = planned(config, lambda config: _forecast(config, of_picture).seconds()["total"])
+    rows = config.input.rows(of_picture)
     check_memory(rows, machine_bytes())
     files = input_fingerprint(config.input)
-    forecast = SecondsForecast(config, rows, upsampled=_as_it_is(config)[1] < rows)
+    forecast = _forecast(config, of_picture)
     foreseen = {"foreseen_seconds": forecast.seconds(), "foreseen_bytes": foreseen_bytes(rows) + restore_bytes(config)}
     write_text(output / "config.toml", _header() + dump_config(config))
     config = within(config, config.budget)
     with Progress(config, **foreseen) as progress:
+        progress.tell(f'the plan for {config.budget.seconds:g} s: "{plan}"' if plan else "")
         progress.tell(told_cost(config))
         store = StageStore(output / "stages", config.refine, resume=resume)
-        job = _Job(config, store, progress, clock)
+        job = _Job(config, of_picture, store, progress)
         *made, lean = _stages(job, files)
-        metrics = write_outputs(Run(config, *made, levelled_views(views, lean), lean), store, clock, foreseen)
+        run = Run(config, *made, levelled_views(views, lean), lean)
+        metrics = write_outputs(run, store, started, foreseen | {"plan": plan})
         progress.finish(output, metrics)
     if not any(stage.found for stage in store.finished):
         forecast.remember(metrics["seconds"], metrics["program_seconds"])
     return metrics
+
+
+def _forecast(config: ReconstructConfig, of_picture: int) -> SecondsForecast:
+    rows = config.input.rows(of_picture)
+    return SecondsForecast(config, rows, upsampled=config.input.doublings(of_picture) > 0)
 
 
 def _header() -> str:
@@ -112,7 +123,7 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str, Lean]:
     """Everything up to the refined scene; whether the distance was estimated, what was done to a given one, and how the
     picture leaned."""
     config, key = job.config, jax.random.key(job.config.seed)
-    weights = files_digest(SHIPPED_DEPTH) if config.asks_network else ""
+    weights = files_digest(Path(config.depth.weights or SHIPPED_DEPTH)) if config.asks_network else ""
     given = config.input
     depends = [
         files,
@@ -135,17 +146,16 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str, Lean]:
     scene, curves, stopped = job.stage(
         "refine", job.settings("refine"), lambda: _refined(job, known, explored, jax.random.fold_in(key, 1))
     )
-    why = ALL_PATHS if len(explored) == config.explore.trajectories else OUT_OF_TIME
-    return joined(known, explored, (scene, curves, stopped), why), bool(about[0]), *about[1:]
+    return joined(known, explored, (scene, curves, stopped)), bool(about[0]), *about[1:]
 
 
 def _read(job: _Job):
     """The panorama, whether its distance was estimated, what was done to a given one, how it leaned. While the network
     makes it finer, what it is shows itself."""
     config = job.config
-    as_it_is, rows = _as_it_is(config)
-    if rows == working_rows(config.input):
+    if not config.input.doublings(job.of_picture):
         return _told(config)
+    as_it_is = dataclasses.replace(config, input=dataclasses.replace(config.input, upsample=NONE))
     with ThreadPoolExecutor(1) as beside:
         finer = beside.submit(_told, config)
         panorama, *about = _told(as_it_is)
@@ -153,14 +163,8 @@ def _read(job: _Job):
         return finer.result()
 
 
-def _as_it_is(config: ReconstructConfig) -> tuple[ReconstructConfig, int]:
-    """The config without upsampling the picture, and its working rows."""
-    plain = dataclasses.replace(config, input=dataclasses.replace(config.input, upsample=NONE))
-    return plain, working_rows(plain.input)
-
-
 def _told(config: ReconstructConfig):
-    network = read_depth_network() if config.asks_network else None
+    network = read_depth_network(config.depth.weights or SHIPPED_DEPTH) if config.asks_network else None
     panorama, told, lean = told_panorama(config.input, read_upsampler(config.input.upsample))
     panorama, estimated = with_distance(panorama, config, network, camera_height=config.input.eye_height)
     return panorama, np.array([estimated]), told, lean
@@ -182,8 +186,6 @@ def _explored(job: _Job, known: Survey, key: jax.Array) -> Iterator[Explored]:
     restore = then_upsample(restore, known.panorama, read_upsampler(method), config=config.upsample)
     shared = [*made_by, job.settings("upsample"), upsampler_fingerprint(method), job.settings("rasterize")]
     for index in range(config.explore.trajectories):
-        if index and job.clock.explored():
-            return
         states = explore_and_restore(peeled, restore, jax.random.fold_in(key, 0), stages=config, start=last)
         last = job.stage(f"restore-{index:02d}", [*shared, index], lambda states=states: next(states))
         yield last
@@ -200,8 +202,4 @@ def _refined(job: _Job, known: Survey, explored: list[Explored], key: jax.Array)
         job.progress.step(last.step)
         if last.evaluated and not last.stopped:
             job.store.save_unfinished(last)
-        if not last.stopped and job.clock.refined():
-            last = evaluate_held_out(last, views, config=config.refine, raster=config.rasterize)
-            last = last.replace(stopped=OUT_OF_TIME)
-            break
     return last.scene, last.curves, last.stopped

@@ -2,6 +2,7 @@
 would miss them."""
 
 import json
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -11,7 +12,6 @@ import numpy as np
 
 from experiments.config import recipe_digest
 from experiments.reconstruct import run_metrics
-from experiments.reconstruct.budget import Clock
 from experiments.reconstruct.flythrough import flythrough
 from experiments.reconstruct.pages.run_report import longest, run_report
 from experiments.reconstruct.pages.viewer_page import viewer_page
@@ -30,8 +30,9 @@ from rein3d_jax.report.report import render_report
 from rein3d_jax.scene import Gaussians
 
 
-def write_outputs(run: Run, store: StageStore, clock: Clock, foreseen: dict) -> dict:
-    """Every file of the run's folder; returns what metrics.json holds, `foreseen` among it."""
+def write_outputs(run: Run, store: StageStore, started: float, foreseen: dict) -> dict:
+    """Every file of the run's folder; returns what metrics.json holds, `foreseen` among it. `started` is the job's
+    time.perf_counter."""
     config, result, output = run.config, run.result, Path(run.config.output)
     with store.timed("write"), ThreadPoolExecutor(1) as beside:  # a processor has two cores, and a picture takes one
         write_ply(output / "scene.ply", result.scene, antialias=config.rasterize.antialias)
@@ -43,7 +44,7 @@ def write_outputs(run: Run, store: StageStore, clock: Clock, foreseen: dict) -> 
         (coarse_ends, seen), (refined_ends, covered) = (_panoramas(scene, ends, run) for scene in scenes)
         film.result()
     metrics = {
-        **run_metrics.cost(store, clock.elapsed()),
+        **run_metrics.cost(store, time.perf_counter() - started),
         **foreseen,
         **run_metrics.size(result, output / "scene.ply"),
         **run_metrics.trouble(result),

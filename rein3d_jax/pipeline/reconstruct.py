@@ -77,13 +77,11 @@ def reconstruct(
     return joined(known, explored, (last.scene, last.curves, last.stopped))
 
 
-def joined(
-    known: Survey, explored: list[Explored], refined: tuple[Gaussians, Curves, str], why: str = ALL_PATHS
-) -> Reconstruction:
-    """The reconstruction of what each stage gave: the states after each path and `why` there are no more; the refined
-    scene, its curves and why refining ended."""
+def joined(known: Survey, explored: list[Explored], refined: tuple[Gaussians, Curves, str]) -> Reconstruction:
+    """The reconstruction of what each stage gave: the states after each path; the refined scene, its curves and why
+    refining ended."""
     scene, curves, stopped = refined
     revealed = tuple(round(float(state.revealed), 4) for state in explored)
-    decisions = Decisions(revealed, why, stopped, int(explored[-1].overflow))
+    decisions = Decisions(revealed, ALL_PATHS, stopped, int(explored[-1].overflow))
     videos, buffers = tuple(state.video for state in explored), Buffers(*map(int, explored[-1].buffers))
     return Reconstruction(known.panorama, known.coarse, known.trajectories, videos, scene, curves, decisions, buffers)

@@ -41,8 +41,7 @@ def refine(
     take_step=take_step,
 ) -> Iterator[Snapshot]:
     """The snapshots after each held-out evaluation and each step, from `snapshot` (`first_snapshot`'s, or any that was
-    saved) to the last, whose `stopped` says why it ended; without steps that one alone, not evaluated. A caller with a
-    clock breaks off earlier.
+    saved) to the last, whose `stopped` says why it ended; without steps that one alone, not evaluated.
 
     `views` (m, ...): every `held_out_every`-th is never trained on. The same key gives the same bytes, also when it
     goes on from a snapshot. `take_step` takes a step: step.py's, or one that shares it out over devices. Raises

@@ -100,18 +100,12 @@ def _warnings_of_input(run: Run):
 
 
 def _warnings(run: Run, metrics: dict):
-    trajectories, paths = run.result.trajectories, len(run.result.videos)
     yield from _warnings_of_input(run)
     yield from _coverage_warnings(metrics["coverage"])
     for name, number in metrics["overflows"].items():
         if number:
             kind = "frames" if name == "explore.max_frames" else "Gaussians"
             yield f"The capacity was reached: {number:,} {kind} found no room and were left out; raise {name}."
-    if paths < len(trajectories.counts):
-        yield (
-            f"The seconds of the budget allowed {paths} of {len(trajectories.counts)} paths; what only "
-            "the others show was not guessed. Raise budget.seconds."
-        )
     if metrics["skipped_steps"]:
         yield f"{metrics['skipped_steps']} refinement steps had values that were not finite, and were skipped."
 

@@ -1,11 +1,11 @@
-"""A budget: limits laid over the stages, a clock that ends them, paths that reveal too little left out."""
+"""A budget: limits laid over the stages, paths that reveal too little left out."""
 
 import json
 
 import pytest
 
 from experiments.reconstruct import __main__ as job
-from experiments.reconstruct.budget import BudgetConfig, Clock, bytes_of_one, check_memory, foreseen_bytes, within
+from experiments.reconstruct.budget import BudgetConfig, bytes_of_one, check_memory, foreseen_bytes, within
 from rein3d_jax.errors import InputError
 from rein3d_jax.pipeline.stages import Stages
 from rein3d_jax.refine import RefineConfig
@@ -48,25 +48,12 @@ def test_a_budget_that_holds_nothing_is_refused_by_name(bad):
         within(Stages(refine=RefineConfig(sh_degree=0)), BudgetConfig(**bad))
 
 
-def test_a_clock_without_seconds_never_ends_and_one_of_no_time_ends_at_once():
-    assert not (Clock(BudgetConfig()).explored() or Clock(BudgetConfig()).refined())
-    spent = Clock(BudgetConfig(seconds=1e-9))
-    assert spent.explored() and spent.refined()
-
-
 def test_a_run_keeps_to_its_bytes_and_says_so(recipe, tmp_path):
     limit = 5000 * bytes_of_one(0)
     metrics = run(recipe, tmp_path / "run", f"budget.bytes={limit}", "refine.steps=2")
     header = 1000  # bytes, of text
     assert metrics["count"]["refined"] <= 5000
     assert metrics["bytes"]["scene.ply"] == (tmp_path / "run" / "scene.ply").stat().st_size <= limit + header
-
-
-def test_seconds_that_are_spent_end_both_stages_and_leave_a_whole_run(recipe, tmp_path):
-    metrics = run(recipe, tmp_path / "run", "budget.seconds=1e-6")
-    assert metrics["stopped"] == {name: "the budget's seconds were spent" for name in ("explore", "refine")}
-    assert len(metrics["paths"]) == 1  # the first is never left out
-    assert (tmp_path / "run" / "report.html").exists()
 
 
 def test_paths_that_reveal_too_little_are_left_out(recipe, tmp_path):

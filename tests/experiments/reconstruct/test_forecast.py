@@ -7,7 +7,7 @@ import pytest
 from experiments.config import load_config
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.diffusion_cost import restore_seconds, told_cost
-from experiments.reconstruct.forecast import COUNTED, SecondsForecast, recalled
+from experiments.reconstruct.forecast import _CALIBRATED, COUNTED, SecondsForecast, recalled
 
 CONFIG = ReconstructConfig()
 SECONDS = {stage: 10.0 + i for i, stage in enumerate(COUNTED)} | {"total": 91.0}
@@ -40,9 +40,41 @@ def test_after_compiling_the_next_one_is_foreseen_to_be_faster(tmp_path):
     assert forecast(tmp_path).seconds()["total"] < SECONDS["total"] - 7 * 2
 
 
+@pytest.fixture
+def as_the_model(monkeypatch):
+    """A machine as fast as the model's, by its calibration, on which any diffusion takes 10 s."""
+    monkeypatch.setattr("experiments.reconstruct.forecast._calibration", lambda: _CALIBRATED)
+    monkeypatch.setattr("experiments.reconstruct.forecast.restore_seconds", lambda *_: 10.0)
+
+
+SMALL, LARGER = (
+    {"restore": load_config(ReconstructConfig, "paper_small", [f"restore.diffusion.network.dit.ffn={width}"]).restore}
+    for width in (32, 64)
+)
+PHOTO = {"input": dataclasses.replace(CONFIG.input, distance=None)}
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "stages"),
+    [
+        (SMALL, LARGER, {"restore", "peel"}),
+        (LARGER, {}, {"restore", "peel"}),
+        ({}, PHOTO, {"read"}),
+    ],
+)
+def test_one_worker_tells_nothing_of_another(tmp_path, as_the_model, one, other, stages):
+    """A network of another size, another restorer, a network that is asked beside a file that is read: what one took
+    is in no forecast of the other's work; where the worker is the same, it is."""
+    slow = forecast(tmp_path, **one)
+    slow.remember({stage: 20 * slow.work[stage] + 1 for stage in COUNTED}, programs(0.5))
+    told = forecast(tmp_path, **other)
+    assert {stage for stage, slowness in told._slowness().items() if slowness == 1.0} == stages
+    assert forecast(tmp_path, **one)._slowness() == pytest.approx(dict.fromkeys(COUNTED, 20.0))
+
+
 def test_a_slower_machine_is_slower_for_other_sizes_too(tmp_path):
     first = forecast(tmp_path, rows=512)
-    first.known = dict.fromkeys(COUNTED, 1.0)
+    first.known = dict.fromkeys(first.workers.values(), 1.0)
     by_model = first.seconds()
     forecast(tmp_path, rows=256).remember({s: 100 * x for s, x in SECONDS.items()}, programs(0.2))
     assert forecast(tmp_path, rows=512).seconds()["lift"] > 5 * by_model["lift"]
