@@ -76,7 +76,7 @@ class RefineConfig(Settings):
     min_scale: float = setting(0.8, "share of the size it was lifted with below which none shrinks", within=_POSITIVE)
     # Fitting sharpens what was seen to the input's own sampling, which costs up to 0.3 dB elsewhere.
     freeze_observed: bool = setting(False, "whether what the input saw stays as it was lifted")
-    max_count: int = setting(0, "Gaussians: more are thinned evenly, what is left is grown; 0: no limit", within=_POSITIVE)
+    max_count: int = setting(0, "Gaussians: more are thinned evenly, and the rest grown; 0: no limit", within=_POSITIVE)
     spare: float = setting(1.0, "free slots, as a share of the Gaussians it starts with", within=_POSITIVE)
     densification: str = setting(
         "default", "clone and split (3DGS); mcmc: relocation under a hard cap", among=("none", "default", "mcmc")
