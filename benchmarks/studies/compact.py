@@ -20,10 +20,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from benchmarks.studies.charts.compact import draw_compact, pareto_front
+from benchmarks.studies.charts.compact import draw_compact, rows_of_front
 from benchmarks.studies.export_readers import READERS
 from benchmarks.studies.peel import RECIPE
-from benchmarks.studies.room_table import StudiedRoom
+from benchmarks.studies.room_table import StudiedRoom, mean_and_error
 from experiments.command import CommandParser
 from experiments.compiled_programs import forget_when_many
 from experiments.config import load_config
@@ -150,17 +150,12 @@ def summary(rooms: dict[str, list[dict]]) -> list[dict]:
     for i, first in enumerate(next(iter(rooms.values()))):
         of_rooms = [rows[i] for rows in rooms.values()]
         row = {key: first[key] for key in ("way", "worth", "format")}
-        row |= {key: _mean_and_error([x[key] for x in of_rooms]) for key in first if key not in row}
+        row |= {key: mean_and_error([x[key] for x in of_rooms]) for key in first if key not in row}
         if "psnr" in first:
             lost = [rows[i]["psnr"] - rows[0]["psnr"] for rows in rooms.values()]
-            row["difference"] = _mean_and_error(lost)
+            row["difference"] = mean_and_error(lost)
         found.append(row)
     return found
-
-
-def _mean_and_error(values: list[float]) -> list[float]:
-    error = np.std(values, ddof=1) / len(values) ** 0.5 if len(values) > 1 else 0.0
-    return [round(float(np.mean(values)), 4), round(float(error), 4)]
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -186,7 +181,7 @@ def _run(options) -> None:
         report = {"recipe": RECIPE, "columns": "mean, standard error", "rows": summary(rooms), "rooms": rooms}
         if options.json:
             write_text(options.json, json.dumps(report, indent=1) + "\n")
-    for row in pareto_front(report["rows"]):
+    for row in rows_of_front(report["rows"]):
         print("front:", row["way"], row["worth"], row["format"], row["bytes"], row["psnr"], row["difference"])
     if options.picture:
         draw_compact(report["rows"], options.picture)

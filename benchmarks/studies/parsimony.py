@@ -24,6 +24,7 @@ from benchmarks.stability.case import drawn_room, traced
 from benchmarks.stability.methods import splats
 from benchmarks.stability.stage import scattered, staged_room
 from benchmarks.studies.charts.parsimony import draw_parsimony
+from benchmarks.studies.room_table import mean_and_error
 from experiments.command import CommandParser
 from experiments.compiled_programs import forget_when_many
 from experiments.config import load_config
@@ -164,7 +165,7 @@ def summary(rows: list[dict]) -> dict:
     seeds = sorted({row["seed"] for row in rows})
     ends = [[row for row in rows if row["seed"] == seed] for seed in seeds]
     shares = {
-        name: _mean_and_error([value(of_one[0]) / value(of_one[-1]) for of_one in ends])
+        name: mean_and_error([value(of_one[0]) / value(of_one[-1]) for of_one in ends], digits=3)
         for name, value in {"gaussians": total, "cpu": seconds, "behind": lambda row: max(row["behind"], 1)}.items()
     }
     lines = {key: _line([row[key] for row in rows], [total(row) for row in rows]) for key in ("pieces", "edges")}
@@ -186,11 +187,6 @@ def _line(x: list[float], y: list[float]) -> dict[str, float]:
     rest = np.asarray(y) - (slope * np.asarray(x) + start)
     return {"slope": round(float(slope), 1), "at none": round(float(start)), "scatter": round(float(rest.std(ddof=2))),
             "r2": round(float(1 - rest.var() / np.var(y)), 3)}  # fmt: skip
-
-
-def _mean_and_error(values: list[float]) -> list[float]:
-    error = np.std(values, ddof=1) / len(values) ** 0.5 if len(values) > 1 else 0.0
-    return [round(float(np.mean(values)), 3), round(float(error), 3)]
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -150,8 +150,8 @@ def lost_to_the_front(rows: dict[str, dict]) -> dict[str, dict]:
         best, plan = (_best(of, budget) for of in (points, plans))
         if best and plan:
             found[f"{budget} s"] = {"best": best, "plan": plan, "behind": round(points[best][1] - points[plan][1], 3)}
-    front = list(points)
-    return found | {"front": [front[i] for i in pareto_front(list(points.values()))]}
+    names = list(points)
+    return found | {"front": [names[i] for i in pareto_front(list(points.values()))]}
 
 
 def _best(points: dict[str, tuple[float, float]], budget: float) -> str | None:

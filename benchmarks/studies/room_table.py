@@ -1,7 +1,7 @@
 """A study of scenes at novel views: its command line, its rows room by room, its means with standard errors."""
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -74,6 +74,12 @@ def _run(options, recipe: str, rows_of_room: RowsOfRoom) -> None:
             write_text(Path(options.json), json.dumps(report, indent=1) + "\n")
     for name, rows in table.items():
         print(f"{name:44}", _summary(rows))
+
+
+def mean_and_error(values: Sequence[float], *, digits: int = 4) -> list[float]:
+    """Mean and its standard error, which is 0 of a single value."""
+    error = np.std(values, ddof=1) / len(values) ** 0.5 if len(values) > 1 else 0.0
+    return [round(float(np.mean(values)), digits), round(float(error), digits)]
 
 
 def _summary(rows: list[dict]) -> dict:

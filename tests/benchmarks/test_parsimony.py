@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.studies.charts.compact import pareto_front
+from benchmarks.studies.charts.compact import rows_of_front
 from benchmarks.studies.parsimony import summary
 
 
@@ -23,4 +23,4 @@ def test_a_line_through_rooms_and_the_emptiest_ones_share():
 def test_the_front_holds_what_no_smaller_file_reaches():
     sizes = {"a": (100, 20.0), "b": (200, 19.0), "c": (300, 21.0), "d": (250, 20.0)}
     rows = [{"name": name, "bytes": [size, 0.0], "psnr": [psnr, 0.0]} for name, (size, psnr) in sizes.items()]
-    assert [row["name"] for row in pareto_front([*rows, {"name": "unread", "bytes": [1, 0.0]}])] == ["a", "c"]
+    assert [row["name"] for row in rows_of_front([*rows, {"name": "unread", "bytes": [1, 0.0]}])] == ["a", "c"]

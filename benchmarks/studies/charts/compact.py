@@ -3,18 +3,16 @@
 import io
 from pathlib import Path
 
+from experiments.evaluate.pareto import pareto_front
 from rein3d_jax.io.files.atomic import write_bytes
 
 _COLOURS = ("#c8553d", "#1f7a8c", "#8a7a2a", "#6a5acd", "#2d6a4f", "#b5179e", "#e09f3e")
 
 
-def pareto_front(rows: list[dict]) -> list[dict]:
+def rows_of_front(rows: list[dict]) -> list[dict]:
     """Of the rows that have a PSNR those that no smaller one reaches, smallest first."""
-    front: list[dict] = []
-    for row in sorted((row for row in rows if "psnr" in row), key=lambda row: row["bytes"][0]):
-        if not front or row["psnr"][0] > front[-1]["psnr"][0]:
-            front.append(row)
-    return front
+    known = [row for row in rows if "psnr" in row]
+    return [known[i] for i in pareto_front([(row["bytes"][0], row["psnr"][0]) for row in known])]
 
 
 def draw_compact(rows: list[dict], path: Path) -> None:
@@ -25,7 +23,7 @@ def draw_compact(rows: list[dict], path: Path) -> None:
     left, right = sheet.subplots(1, 2, sharey=True)
     lifted = rows[0]["way"]
     _lines(left, {row["format"]: [] for row in rows}, [row for row in rows if row["way"] == lifted], "format")
-    front = pareto_front(rows)
+    front = rows_of_front(rows)
     left.plot(
         *zip(*((row["bytes"][0], row["psnr"][0]) for row in front), strict=True), color="0.8", linewidth=6, zorder=0
     )
