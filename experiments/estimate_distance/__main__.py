@@ -29,7 +29,7 @@ from rein3d_jax.io.pictures.distance import write_distance_exr
 from rein3d_jax.io.pictures.image import write_rgb
 from rein3d_jax.io.pictures.panorama import read_panorama
 from rein3d_jax.io.pictures.photo import panorama_rows
-from rein3d_jax.networks.depth import SHIPPED_DEPTH, read_depth_network
+from rein3d_jax.networks.depth import read_depth_network
 from rein3d_jax.networks.upsampler import read_upsampler
 from rein3d_jax.pipeline.survey import with_distance
 from rein3d_jax.report.colour_map import colour_map, colour_range
@@ -56,7 +56,7 @@ def _estimate(options: argparse.Namespace) -> None:
     given.append("input.upsample=none")  # its guessed detail says nothing of distance
     config = load_config(ReconstructConfig, options.config, given + options.set)
     rows = panorama_rows(resolve(config.input.panorama))  # a picture that is none is refused before the long part
-    network = read_depth_network(config.depth.weights or SHIPPED_DEPTH) if config.asks_network else None
+    network = read_depth_network(config.depth_weights) if config.asks_network else None
     panorama, told, lean = told_panorama(config.input, read_upsampler(config.input.upsample))
     placed, estimated = with_distance(panorama, config, network, camera_height=config.input.eye_height)
     picture = levelled(read_panorama(resolve(config.input.panorama)), lean).rgb

@@ -29,7 +29,7 @@ from rein3d_jax.depth.level import Lean
 from rein3d_jax.explore.trajectories import radial_trajectories
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.lift import LiftConfig
-from rein3d_jax.networks.depth import SHIPPED_DEPTH, read_depth_network
+from rein3d_jax.networks.depth import read_depth_network
 from rein3d_jax.networks.trained import files_digest, read_network, require_network, weights_fingerprint
 from rein3d_jax.networks.upsampler import read_upsampler, upsampler_fingerprint
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
@@ -123,7 +123,7 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str, Lean]:
     """Everything up to the refined scene; whether the distance was estimated, what was done to a given one, and how the
     picture leaned."""
     config, key = job.config, jax.random.key(job.config.seed)
-    weights = files_digest(Path(config.depth.weights or SHIPPED_DEPTH)) if config.asks_network else ""
+    weights = files_digest(config.depth_weights) if config.asks_network else ""
     given = config.input
     depends = [
         files,
@@ -164,7 +164,7 @@ def _read(job: _Job):
 
 
 def _told(config: ReconstructConfig):
-    network = read_depth_network(config.depth.weights or SHIPPED_DEPTH) if config.asks_network else None
+    network = read_depth_network(config.depth_weights) if config.asks_network else None
     panorama, told, lean = told_panorama(config.input, read_upsampler(config.input.upsample))
     panorama, estimated = with_distance(panorama, config, network, camera_height=config.input.eye_height)
     return panorama, np.array([estimated]), told, lean
