@@ -1,5 +1,6 @@
 """The one door to OpenImageIO's readers: the header first, pixels when it has been judged."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -32,7 +33,8 @@ def open_image(path: Path) -> Iterator[oiio.ImageInput]:
     as_stored.attribute("pnm:pfmflip", 1)  # PFM begins at the bottom
     image = None
     try:
-        image = oiio.ImageInput.open(str(path), as_stored)
+        with _silent_libpng():
+            image = oiio.ImageInput.open(str(path), as_stored)
         if image is None:
             raise InputError(f"{path} cannot be opened as a picture ({_first_line(oiio.geterror())}): {_MEND}")
         if image.format_name() not in _FORMATS:
@@ -48,7 +50,8 @@ def open_image(path: Path) -> Iterator[oiio.ImageInput]:
 
 def read_pixels(path: Path, image: oiio.ImageInput, kind: str) -> np.ndarray:
     """All pixels (h, w, channels) as `kind` ("float", "uint16"). Raises InputError if the file is damaged."""
-    pixels = image.read_image(kind)
+    with _silent_libpng():
+        pixels = image.read_image(kind)
     error = image.geterror()
     if pixels is None or error:
         raise InputError(f"{path} is damaged or cut short ({_first_line(error)}): copy or export it again")
@@ -66,7 +69,8 @@ def read_reduced(path: Path, image: oiio.ImageInput, columns: int) -> np.ndarray
     found = np.empty((rows, wide, spec.nchannels), np.float32)
     for begin in range(0, rows, _BAND):
         end = min(begin + _BAND, rows)
-        band = image.read_scanlines(begin * k, end * k, 0, 0, spec.nchannels, "float")
+        with _silent_libpng():
+            band = image.read_scanlines(begin * k, end * k, 0, 0, spec.nchannels, "float")
         if band is None:
             raise InputError(f"{path} is damaged or cut short ({_first_line(image.geterror())}): export it again")
         band = band.reshape(end - begin, k, spec.width, -1)[:, :, : wide * k]
@@ -80,6 +84,23 @@ def read_credit(path: Path) -> str:
     with open_image(path) as image:
         said = (image.spec().get_string_attribute(name) for name in ("Artist", "Copyright"))
         return "; ".join(" ".join(text.split())[:_CREDIT] for text in said if text.strip())
+
+
+@contextmanager
+def _silent_libpng() -> Iterator[None]:
+    """While it lasts nothing is written to the process's stderr: libpng writes what OpenImageIO reports as well."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # a process without one
+        yield
+        return
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
 
 
 def _check_whole_and_upright(path: Path, spec: oiio.ImageSpec) -> None:

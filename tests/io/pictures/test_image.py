@@ -151,6 +151,17 @@ def test_truncated_pictures(tmp_path, suffix):
         read_rgb(path)
 
 
+@pytest.mark.parametrize("at", [40, 0.6])  # of the header, of the pixels
+def test_a_damaged_png_has_one_line_and_libpng_none(tmp_path, at, capfd):
+    path = tmp_path / "room.png"
+    whole = bytearray(encode_png(np.random.default_rng(0).integers(0, 256, (32, 64, 3), np.uint8)))
+    whole[at if at > 1 else int(at * len(whole))] ^= 255
+    path.write_bytes(whole)
+    with pytest.raises(InputError, match="room.png"):
+        read_rgb(path)
+    assert capfd.readouterr().err == ""
+
+
 def test_cropped_turned_and_colourless_pictures(tmp_path):
     write_oiio(tmp_path / "turned.jpg", RGB, ("R", "G", "B"), "uint8", Orientation=3)
     write_oiio(tmp_path / "layers.exr", RGB, ("a.U", "b.V", "c.W"))
