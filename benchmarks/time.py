@@ -2,12 +2,13 @@
 
 CPU seconds (user and system) of each, wall seconds, seconds until viewer.html is first there, and by stage how much
 went into tracing, compiling and the work itself; medians over rounds. `--beside` runs another checkout of the project
-in turn, `--rows` a photo at several sizes, with the slopes of what grows.
+in turn, `--rows` a photo at several sizes, with the slopes of what grows and, with `--chart`, a picture of it.
 
     python -m benchmarks.time --json benchmarks/results/time.json [--recipes quick,draft] [--beside FOLDER]
-    python -m benchmarks.time --photo pano.jpg --rows 128,256,512,1024 --json benchmarks/results/growth.json
+    python -m benchmarks.time --photo pano.jpg --rows 128,256,512,1024,2048 --json FILE.json --chart FILE.png
 """
 
+import io
 import json
 import os
 import resource
@@ -21,12 +22,16 @@ from pathlib import Path
 import numpy as np
 
 from experiments.command import CommandParser
+from experiments.evaluate.chart import check_charts
 from rein3d_jax.errors import InputError
-from rein3d_jax.io.files.atomic import write_text
+from rein3d_jax.io.files.atomic import write_bytes, write_text
 
 HERE = Path(__file__).resolve().parents[1]
 RUNS = ("first", "second")  # on a machine
 GROWING = ("cpu_s", "peak_bytes", "viewer_bytes")
+CHARTED = {"cpu_s": "CPU seconds", "wall_s": "seconds", "peak_bytes": "GB of memory", "viewer_bytes": "MB of page"}
+FORESEEN = {"wall_s": "foreseen_s", "peak_bytes": "foreseen_bytes"}
+_UNITS = {"peak_bytes": 1e-9, "foreseen_bytes": 1e-9, "viewer_bytes": 1e-6}
 _LOOK = 0.1  # seconds between looks for viewer.html
 
 
@@ -104,6 +109,29 @@ def growth(by_rows: dict[int, dict]) -> dict[str, float]:
     return with_pixels | {f"{of} / gaussians": slope(of, gaussians) for of in GROWING}
 
 
+def growth_chart(by_rows: dict[int, dict]) -> bytes:
+    """PNG: what a job took by its pixels and by its Gaussians, both axes logarithmic; dashed, what was foreseen."""
+    from matplotlib.figure import Figure
+
+    figure, slopes = Figure(figsize=(12, 4.6), dpi=110, layout="constrained"), growth(by_rows)
+    rows = list(by_rows.values())
+    across = {"pixels": [2 * number**2 for number in by_rows], "gaussians": [row["gaussians"] for row in rows]}
+    for axis, (name, places) in zip(figure.subplots(1, 2, sharey=True), across.items(), strict=True):
+        for index, (of, label) in enumerate(CHARTED.items()):
+            slope = f", slope {slopes[key]:.2f}" if (key := f"{of} / {name}") in slopes else ""
+            colour, unit = f"C{index}", _UNITS.get(of, 1.0)
+            axis.loglog(places, [unit * row[of] for row in rows], "o-", color=colour, label=label + slope)
+            if of in FORESEEN:
+                foreseen = [unit * row[FORESEEN[of]] for row in rows]
+                axis.loglog(places, foreseen, "--", color=colour, label=f"{label}, foreseen")
+        axis.set(xlabel=f"{name} (slope of Gaussians over pixels {slopes['gaussians / pixels']:.2f})")
+        axis.grid(visible=True, color="0.9")
+        axis.legend(fontsize=8)
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", metadata={"Software": None})
+    return stream.getvalue()
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where an argument is at fault."""
     parser = CommandParser("time", __doc__, "benchmarks")
@@ -114,6 +142,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--rows", default="128,256,512,1024", metavar="A,B", help="working rows (default: %(default)s)")
     parser.add_argument("--runs", type=int, default=2, choices=(1, 2), help="1 leaves the second of each job out")
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    parser.add_argument("--chart", metavar="FILE", help="draw the growth of a --photo's first jobs there, as PNG")
     return parser.run(_run, arguments)
 
 
@@ -124,6 +153,10 @@ def _run(options) -> None:
     if options.photo:
         photo = ["--input", str(Path(options.photo).resolve()), "--set"]
         jobs = {f"{rows} rows": [*photo, f"input.height={rows}"] for rows in options.rows.split(",")}
+    if options.chart:
+        check_charts()
+        if len(jobs) < 2 or not options.photo:
+            raise InputError("--chart draws how a job grows: give a --photo, and several --rows")
     projects = {"this": HERE} | ({"beside": Path(options.beside)} if options.beside else {})
     found = measure(projects, jobs, options.rounds, RUNS[: options.runs])
     for name, of_jobs in found.items():
@@ -132,16 +165,19 @@ def _run(options) -> None:
                 print(f"{name:10} {job:14} {turn:7} {_line(row)}")
     report = {"cores": os.cpu_count(), "rounds": options.rounds} | found
     if options.photo and len(jobs) > 1:
-        report["slopes"] = {name: _growth(of_jobs) for name, of_jobs in found.items()}
+        by_rows = {name: _by_rows(of_jobs) for name, of_jobs in found.items()}
+        report["slopes"] = {n: {run: growth(rows) for run, rows in of.items()} for n, of in by_rows.items()}
         print(json.dumps(report["slopes"], indent=1))
     if options.json:
         write_text(Path(options.json), json.dumps(report, indent=1) + "\n")
+    if options.chart:
+        write_bytes(Path(options.chart), growth_chart(by_rows["this"]["first"]))
 
 
-def _growth(of_jobs: dict) -> dict:
-    """By run."""
+def _by_rows(of_jobs: dict) -> dict[str, dict[int, dict]]:
+    """{run: {rows: figures}}."""
     runs = next(iter(of_jobs.values()))
-    return {run: growth({int(job.split()[0]): turns[run] for job, turns in of_jobs.items()}) for run in runs}
+    return {run: {int(job.split()[0]): turns[run] for job, turns in of_jobs.items()} for run in runs}
 
 
 if __name__ == "__main__":

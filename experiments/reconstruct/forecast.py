@@ -1,14 +1,15 @@
 """What a job will take: seconds by stage, foreseen from its sizes, corrected by what jobs took on this machine before.
 
 A stage takes its share of the work, and makes its programs: compiled the first time, read from the cache afterwards.
-The model's numbers are those of one core of a 2.5 GHz Xeon; a short calibration says how fast this machine is, until a
-job has told by stage.
+The model's numbers are those of two cores of an AMD EPYC with nothing else to do; a short calibration says how fast
+this machine is, and how busy, until a job has told by stage.
 """
 
 import dataclasses
 import hashlib
 import json
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -21,15 +22,23 @@ from experiments.reconstruct.diffusion_cost import restore_seconds
 from experiments.reconstruct.inputs import InputConfig
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
+from rein3d_jax.pipeline.refine_scene import STILL_OF_A_PIXEL
 from rein3d_jax.restore.restorer import DIFFUSION
 from rein3d_jax.upsample import LEARNED, NONE
 
+_MODEL = 2  # of the numbers below: slowness against other ones says nothing
 COUNTED = ("read", "lift", "explore", "peel", "restore", "refine", "write")
-# Seconds for programs, compiled and kept.
-_COMPILED = dict(zip(COUNTED, (18.0, 17.0, 0.7, 38.0, 7.0, 2.0, 18.0), strict=True))
-_KEPT = dict(zip(COUNTED, (2.0, 2.2, 0.1, 4.5, 1.0, 0.5, 2.5), strict=True))
-_NETWORK = 2.4  # seconds for the depth network
-_CALIBRATED = 0.072  # seconds that `_calibration` takes on the model's machine
+# Seconds for programs, compiled and kept, of every job; of what only some have: an estimated distance, which leaves an
+# outside to be made up, a network for a finer picture, views to compare with, a restored path and what is fitted to it.
+_COMPILED = dict(zip(COUNTED, (3.0, 13.0, 0.5, 25.0, 5.0, 1.8, 7.5), strict=True))
+_KEPT = dict(zip(COUNTED, (0.6, 2.2, 0.1, 4.5, 1.0, 0.5, 2.0), strict=True))
+_OF_ESTIMATE = {"read": (22.0, 2.0), "peel": (9.0, 0.5)}
+_OF_FINER, _OF_VIEWS = (12.0, 3.5), (6.0, 0.5)
+_OF_A_PATH = {"restore": (14.0, 0.5), "refine": (20.0, 0.5)}
+# Of jobs that restore only what opens enough, those in which some path does. Where the distance is an estimate nothing
+# tells before the run: half a path is foreseen, and neither a path nor none is far off.
+_OPENS = 0.5
+_CALIBRATED = 0.54  # processor's seconds that `_calibration`'s work takes on the model's machine
 _WAY = 6.0  # metres of a path, on average
 
 
@@ -39,23 +48,28 @@ class SecondsForecast:
     def __init__(self, config: ReconstructConfig, rows: int, *, upsampled: bool):
         self.work, self.keys = _work(config, rows, upsampled=upsampled), _keys(config, rows, upsampled=upsampled)
         self.workers = _workers(config, upsampled=upsampled)
-        self.looks = 1.5 if config.input.distance is None else 1.0  # the network's programs are read's, too
+        # Between the stages: what stands at the start, and the first look, whose page packs the lifted scene.
+        self.beside = 1.0 + 10 * _gaussians(config, rows)
+        self.compiled, self.kept = (_programs(config, kept=kept, upsampled=upsampled) for kept in (False, True))
         folder = jax.config.jax_compilation_cache_dir
         self.file = None if folder is None else Path(folder) / "seconds.json"
         self.known = {} if self.file is None else recalled(self.file)
 
     def seconds(self) -> dict[str, float]:
         """By stage, and their total."""
-        slowness, compiled = self._slowness(), self._programs(_COMPILED)
-        programs = {stage: self.known.get(key, compiled[stage]) for stage, key in self.keys.items()}
+        slowness, known = self._slowness(), self.known
+        programs = {
+            stage: known[key] if key in known else _calibration() * self.compiled[stage]
+            for stage, key in self.keys.items()
+        }
         found = {stage: round(slowness[stage] * self.work[stage] + programs[stage], 1) for stage in COUNTED}
-        return found | {"total": round(sum(found.values()), 1)}
+        return found | {"total": round(sum(found.values()) + slowness["write"] * self.beside, 1)}
 
     def remember(self, seconds: dict[str, float], programs: dict[str, dict[str, float]]) -> None:
         """Keeps what a whole job took by stage, and how much of that for tracing and for compiling."""
         if self.file is None:
             return
-        kept, found = self._programs(_KEPT), dict(self.known)
+        kept, found = self.kept, dict(self.known)
         for stage, key in self.keys.items():
             made = sum(of[stage] for of in programs.values())
             if 2 * made < seconds[stage]:  # or what is left between two threads' compilers says little
@@ -68,32 +82,59 @@ class SecondsForecast:
     def _slowness(self) -> dict[str, float]:
         """Of who works in each stage on this machine, against the model's; by calibration until a job has told."""
         known = {stage: self.known.get(worker) for stage, worker in self.workers.items()}
-        otherwise = _calibration() / _CALIBRATED if None in known.values() else 1.0
-        return {stage: otherwise if slowness is None else slowness for stage, slowness in known.items()}
+        return {stage: _calibration() if slowness is None else slowness for stage, slowness in known.items()}
 
-    def _programs(self, table: dict[str, float]) -> dict[str, float]:
-        return table | {"read": self.looks * table["read"]}
+
+def _programs(config: ReconstructConfig, *, kept: bool, upsampled: bool) -> dict[str, float]:
+    """Seconds by stage for a job's programs, compiled or kept."""
+    total = dict(_KEPT if kept else _COMPILED)
+    total["read"] += _OF_FINER[kept] * _by_network(config, upsampled)
+    total["write"] += _OF_VIEWS[kept] * (config.input.views is not None)
+    for table, share in ((_OF_ESTIMATE, config.asks_network), (_OF_A_PATH, min(_restored(config), 1.0))):
+        for stage, seconds in table.items():
+            total[stage] += share * seconds[kept]
+    return total
+
+
+def _by_network(config: ReconstructConfig, upsampled: bool) -> bool:
+    """Whether a network makes the picture finer."""
+    return upsampled and config.input.upsample == LEARNED
+
+
+def _restored(config: ReconstructConfig) -> float:
+    """Paths that are restored: all, or as many as on average."""
+    if config.explore.min_revealed == 0:
+        return config.explore.trajectories
+    return _OPENS * (config.input.distance is None)
 
 
 def _work(config: ReconstructConfig, rows: int, *, upsampled: bool) -> dict[str, float]:
     """Seconds of each stage without its programs, by the model, at so many working rows."""
     pixels, restored = (2 * r * r / 1e6 for r in (rows, config.restore.height))  # million
-    paths, every = config.explore.trajectories, config.explore.min_revealed == 0
-    made_finer = 31 * pixels if config.input.upsample == LEARNED and upsampled else 0.0
+    paths, open_ones = config.explore.trajectories, _restored(config)
+    made_finer = 20 * pixels * _by_network(config, upsampled)
     frames = min(_WAY / config.explore.step, config.explore.max_frames)
     by_network = restore_seconds(config, frames)
     views, film = 24 if config.input.views else 0, config.film.width * config.film.height / 1e6
-    size = 0.02 + 0.16 * config.lift.share * pixels  # to render a small picture of the scene
-    step = 0.03 + 4 * config.refine.views.size**2 / 1e6
+    gaussians, view = _gaussians(config, rows), config.refine.views.size**2 / 1e6
+    size, around = 0.02 + 0.13 * gaussians, 0.05 + 0.7 * gaussians  # to render a small picture of the scene; a panorama
+    # A step sees what may change, all or some tenth, and of the rest no more than its views can tell apart.
+    fitted = 0.1 * gaussians + min(0.9 * gaussians, STILL_OF_A_PIXEL * 6 * view)
+    step = 0.01 + 3 * view + 0.8 * (fitted if config.refine.freeze_observed else gaussians)
     return {
-        "read": 0.7 + 2 * pixels + made_finer + _NETWORK * (config.input.distance is None),
-        "lift": 0.3 + 1.0 * pixels,
+        "read": 0.5 + 0.8 * pixels + made_finer + 1.2 * config.asks_network,
+        "lift": 0.3 + 2.2 * pixels,
         "explore": 0.1,
-        "peel": 0.3 + 4 * restored if config.peel.room else 0.2,
-        "restore": paths * (0.1 + size + restored + every * frames * (size + 4 * restored)) + by_network,
-        "refine": 0.3 + every * config.refine.steps * config.refine.batch * step,
-        "write": 2.0 + (20 + frames * paths) * (size + 0.1 * film) + 2 * views * size,
+        "peel": 0.3 + 3 * restored + 0.3 * pixels if config.peel.room else 0.2,
+        "restore": paths * (0.1 + around) + open_ones * frames * (2 * around + restored) + by_network,
+        "refine": 0.3 + min(open_ones, 1.0) * config.refine.steps * config.refine.batch * step,
+        "write": 2.0 + 6 * gaussians + (20 + frames * paths) * (size + 0.1 * film) + 6 * around + 2 * views * size,
     }
+
+
+def _gaussians(config: ReconstructConfig, rows: int) -> float:
+    """Million, at most."""
+    return config.lift.share * 2 * rows * rows / 1e6
 
 
 def _keys(config: ReconstructConfig, rows: int, *, upsampled: bool) -> dict[str, str]:
@@ -112,7 +153,7 @@ def _workers(config: ReconstructConfig, *, upsampled: bool) -> dict[str, str]:
     restorer = (config.restore.method, config.restore.diffusion.network if by_diffusion else None)
     who = dict.fromkeys(COUNTED) | {"restore": restorer, "peel": restorer if config.peel.room else None}
     who["read"] = (config.input.distance is None, config.input.upsample if upsampled else NONE)
-    return {stage: f"{stage} by {_hash(worker)}" for stage, worker in who.items()}
+    return {stage: f"{stage} by {_hash((_MODEL, worker))}" for stage, worker in who.items()}
 
 
 def _hash(of) -> str:
@@ -130,8 +171,17 @@ def recalled(file: Path) -> dict[str, float]:
 
 @cache
 def _calibration() -> float:
-    """Seconds of a little work of the kind that jobs do; measured once, that forecasts of one job be comparable."""
-    numbers, started = np.linspace(0, 1e4, 1 << 20, dtype=np.float32), time.perf_counter()
-    for _ in range(16):
-        np.sort(np.sin(numbers))
-    return time.perf_counter() - started
+    """How slow this machine is against the model's, by a little work on two cores; measured once, that forecasts of one
+    job be comparable. A sum that waits for itself: NumPy's sort takes eight times as long on processors that scatter
+    slowly. Where others' work is beside it, half of what that costs now, in logarithms: it comes and goes."""
+    started, used = time.perf_counter(), time.process_time()
+    with ThreadPoolExecutor(2) as both:
+        list(both.map(_sums, range(2)))
+    wall, cpu = time.perf_counter() - started, time.process_time() - used
+    return cpu / _CALIBRATED * max(2 * wall / cpu, 1.0) ** 0.5
+
+
+def _sums(_) -> None:
+    ones = np.ones(1 << 18, np.float32)
+    for _ in range(300):
+        np.cumsum(ones)

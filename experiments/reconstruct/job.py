@@ -32,7 +32,7 @@ from rein3d_jax.lift import LiftConfig
 from rein3d_jax.networks.depth import read_depth_network
 from rein3d_jax.networks.trained import files_digest, read_network, require_network, weights_fingerprint
 from rein3d_jax.networks.upsampler import read_upsampler, upsampler_fingerprint
-from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
+from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore, lightly
 from rein3d_jax.pipeline.peel_scene import peel_scene
 from rein3d_jax.pipeline.reconstruct import Reconstruction, joined
 from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene, where_it_pays
@@ -82,10 +82,10 @@ def run_job(config: ReconstructConfig, *, resume: bool = False) -> dict:
     of_picture = picture_rows(config.input)
     config, plan = planned(config, lambda config: _forecast(config, of_picture).seconds()["total"])
     rows = config.input.rows(of_picture)
-    check_memory(rows, machine_bytes())
+    check_memory(rows, machine_bytes(), lambda rows: _bytes(config, rows))
     files = input_fingerprint(config.input)
     forecast = _forecast(config, of_picture)
-    foreseen = {"foreseen_seconds": forecast.seconds(), "foreseen_bytes": foreseen_bytes(rows) + restore_bytes(config)}
+    foreseen = {"foreseen_seconds": forecast.seconds(), "foreseen_bytes": _bytes(config, rows)}
     write_text(output / "config.toml", _header() + dump_config(config))
     config = within(config, config.budget)
     with Progress(config, **foreseen) as progress:
@@ -105,6 +105,11 @@ def run_job(config: ReconstructConfig, *, resume: bool = False) -> dict:
 def _forecast(config: ReconstructConfig, of_picture: int) -> SecondsForecast:
     rows = config.input.rows(of_picture)
     return SecondsForecast(config, rows, upsampled=config.input.doublings(of_picture) > 0)
+
+
+def _bytes(config: ReconstructConfig, rows: int) -> int:
+    """Foreseen, the restorer's network among them."""
+    return foreseen_bytes(rows, config.lift.share, estimated=config.asks_network) + restore_bytes(config)
 
 
 def _header() -> str:
@@ -142,7 +147,7 @@ def _stages(job: _Job, files: str) -> tuple[Reconstruction, bool, str, Lean]:
     )
     known = Survey(panorama, coarse, trajectories)
     job.look(known, about)
-    explored = list(_explored(job, known, key))
+    explored = lightly(_explored(job, known, key))
     scene, curves, stopped = job.stage(
         "refine", job.settings("refine"), lambda: _refined(job, known, explored, jax.random.fold_in(key, 1))
     )

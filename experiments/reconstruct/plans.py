@@ -23,7 +23,7 @@ class JobPlan(NamedTuple):
 PLANS = (
     JobPlan("128 rows", ("input.height=128", "input.upsample=none", "lift.share=1", "restore.height=128",
                          *_NO_PATHS, *_SMALL_FILM)),
-    JobPlan("256 rows", ("input.height=256", "input.upsample=none", "lift.share=0.5", "lift.worth=0.01",
+    JobPlan("256 rows", ("input.height=256", "input.upsample=none", "lift.share=0.5", "lift.worth=0.005",
                          "restore.height=256", *_NO_PATHS, *_SMALL_FILM)),
     JobPlan("512 by cubics", ("input.height=512", "input.upsample=bicubic", "lift.share=0.5", "lift.worth=0.01",
                               "restore.height=256", *_NO_PATHS, *_SMALL_FILM)),

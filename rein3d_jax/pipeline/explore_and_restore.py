@@ -22,7 +22,7 @@ from rein3d_jax.scene import Gaussians, Video
 class Explored:
     """The scene after some trajectories: enough to go on with the next one, to the bit."""
 
-    scene: Gaussians
+    scene: Gaussians | None  # none where `lightly` has left it to a later state
     video: Video  # the last trajectory's frames, holes filled; alpha still says what was observed. The last frame alone
     # where the path revealed too little to be restored
     taken: jax.Array  # () trajectories so far
@@ -39,6 +39,14 @@ def explore_and_restore(
     for index in range(0 if start is None else int(start.taken), len(known.trajectories.counts)):
         last = _explored(known, restore, jax.random.fold_in(key, index), stages, last)
         yield last
+
+
+def lightly(states: Iterator[Explored]) -> list[Explored]:
+    """All of `explore_and_restore`'s states, the scene in the last one alone: one of 2048 rows takes 0.3 GB."""
+    kept: list[Explored] = []
+    for state in states:
+        kept = [*(one.replace(scene=None) for one in kept), state]
+    return kept
 
 
 def _explored(known: Survey, restore: Restorer, key: jax.Array, stages: Stages, last: Explored | None) -> Explored:

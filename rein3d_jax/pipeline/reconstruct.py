@@ -7,7 +7,7 @@ from flax import struct
 
 from rein3d_jax.conventions import EYE_HEIGHT
 from rein3d_jax.explore.trajectories import Trajectories
-from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
+from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore, lightly
 from rein3d_jax.pipeline.peel_scene import peel_scene
 from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene, where_it_pays
 from rein3d_jax.pipeline.stages import Stages
@@ -69,7 +69,7 @@ def reconstruct(
     explore_key, refine_key, peel_key = (jax.random.fold_in(key, i) for i in range(3))
     peeled = known.replace(coarse=peel_scene(known, background, restore, peel_key, stages=stages))
     restore = then_upsample(restore, panorama, upsampler, config=stages.upsample)
-    explored = list(explore_and_restore(peeled, restore, explore_key, stages=stages))
+    explored = lightly(explore_and_restore(peeled, restore, explore_key, stages=stages))
     videos = [state.video for state in explored]
     stages = where_it_pays(stages, videos)
     views = collect_views(panorama, videos, stages=stages)

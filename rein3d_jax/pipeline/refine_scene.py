@@ -13,10 +13,11 @@ from rein3d_jax.parallel import data_mesh
 from rein3d_jax.pipeline.devices import steps_over
 from rein3d_jax.pipeline.stages import Stages, origin_pose
 from rein3d_jax.rasterize import bucket
-from rein3d_jax.refine import Snapshot, Views, first_snapshot, join_views, refine, views_from_panorama
+from rein3d_jax.refine import Snapshot, Still, Views, first_snapshot, join_views, refine, views_from_panorama
 from rein3d_jax.refine.step import take_step
 from rein3d_jax.scene import Gaussians, Panorama, Video
 
+STILL_OF_A_PIXEL = 4  # Gaussians of what stays as it is, for each pixel of six views: with more, no view differs
 _GOLDEN_ANGLE = 2.399963  # radians: successive multiples spread the cuts between a trajectory's views evenly
 
 
@@ -53,22 +54,28 @@ def refine_scene(
     """`refine`'s snapshots (paper Sec. 3.3) of the scene `start`, brought within its limits, or on from a snapshot."""
     config, raster = stages.refine, stages.rasterize
     if isinstance(start, Gaussians):
-        scene = _within_limits(start, stages)
-        sure = on_observed(panorama, scene.means) & ~in_doubt(panorama, scene.means)
-        fixed = sure if config.freeze_observed else None
+        moving, still = _parts(start, panorama, stages)
         extent = scene_extent(panorama)
-        start = first_snapshot(scene, views, extent=extent, config=config, raster=raster, fixed=fixed)
+        start = first_snapshot(moving, views, extent=extent, config=config, raster=raster, still=still)
     chosen = take_step if config.devices == 1 else steps_over(data_mesh(config.devices))
     return refine(start, views, key, config=config, raster=raster, take_step=chosen)
 
 
-def _within_limits(scene: Gaussians, stages: Stages) -> Gaussians:
-    """The scene with `max_count` Gaussians at most, in a buffer with room to grow. Buffers of rounded size: the next
-    scene's program is then compiled already."""
-    limit = stages.refine.max_count
+def _parts(scene: Gaussians, panorama: Panorama, stages: Stages) -> tuple[Gaussians, Still | None]:
+    """What of the scene may change, in a buffer with room to grow, and what stays as it is; `max_count` Gaussians
+    together at most. Buffers of rounded size: the next scene's program is then compiled already."""
+    config, limit, still, kept = stages.refine, stages.refine.max_count, None, 0
     if limit:
         scene = lighter_scene(scene, limit)
-    scene = compact(scene, capacity=bucket(int(int(scene.alive.sum()) * (1 + stages.refine.spare))))
-    if 0 < limit < scene.alive.shape[0]:
-        scene = jax.tree.map(lambda x: x[:limit], scene)  # the living come first
-    return scene
+    living = int(scene.alive.sum())
+    if config.freeze_observed:
+        sure = scene.alive & on_observed(panorama, scene.means) & ~in_doubt(panorama, scene.means)
+        kept = int(sure.sum())
+        still = compact(scene.replace(alive=sure), capacity=bucket(kept))
+        still = Still(still, lighter_scene(still, int(STILL_OF_A_PIXEL * 6 * config.views.size**2)))
+        scene = scene.replace(alive=scene.alive & ~sure)
+    moving = compact(scene, capacity=bucket(int(living * (1 + config.spare)) - kept))
+    if 0 < limit < moving.alive.shape[0] + kept:
+        # The living come first. Where none may change there is a dead slot, which nothing brings to life.
+        moving = jax.tree.map(lambda x: x[: max(limit - kept, 1)], moving)
+    return moving, still

@@ -3,6 +3,7 @@
 from rein3d_jax.refine.config import DensifyConfig, PhotometricConfig, RatesConfig, RefineConfig, ViewsConfig
 from rein3d_jax.refine.refine import evaluate_held_out, refine
 from rein3d_jax.refine.snapshot import Curves, Snapshot, blank_snapshot, first_snapshot
+from rein3d_jax.refine.state import Still
 from rein3d_jax.refine.views import Views, join_views, views_from_panorama
 
 __all__ = [
@@ -12,6 +13,7 @@ __all__ = [
     "RatesConfig",
     "RefineConfig",
     "Snapshot",
+    "Still",
     "Views",
     "ViewsConfig",
     "blank_snapshot",

@@ -33,7 +33,7 @@ def _densify(state: RefineState, key: jax.Array, *, config: DensifyConfig):
     parameters, alive = state.parameters, state.alive
     count = alive.shape[0]
     mean_gradient = jnp.where(alive, state.gradient_sum / jnp.maximum(state.seen, 1.0), 0.0)
-    wanted = (mean_gradient > config.gradient) & ~state.fixed
+    wanted = mean_gradient > config.gradient
     room = max(int(config.share * count), 1)
     steepest, parents = jax.lax.top_k(jnp.where(wanted, mean_gradient, 0.0), room)
     free = jnp.nonzero(~alive, size=room, fill_value=count)[0]
@@ -61,7 +61,7 @@ def _densify(state: RefineState, key: jax.Array, *, config: DensifyConfig):
 
     faint = jax.nn.sigmoid(grown["opacity_logits"]) < config.prune_opacity
     huge = jnp.exp(jnp.max(grown["log_scales"], axis=-1)) > config.prune_size * state.extent
-    pruned = alive & ~state.fixed & (faint | (huge & (state.step > config.reset_every)))
+    pruned = alive & (faint | (huge & (state.step > config.reset_every)))
     zeros = jnp.zeros(count)
     counts = {"added": placed.sum(), "pruned": pruned.sum(), "overflow": (steepest > 0).sum() - placed.sum()}
     new = state.replace(
@@ -80,8 +80,7 @@ def _draw(parameters, ids, key):
 def _reset_opacity(state: RefineState) -> RefineState:
     """Opacity at most RESET_OPACITY, its moments forgotten: what the views need comes back, floaters do not."""
     ceiling = jnp.log(RESET_OPACITY / (1 - RESET_OPACITY))
-    logits = state.parameters["opacity_logits"]
-    logits = jnp.where(state.fixed, logits, jnp.minimum(logits, ceiling))
+    logits = jnp.minimum(state.parameters["opacity_logits"], ceiling)
     inner = dict(state.optimizer.inner_states)
     inner["opacity_logits"] = forget(inner["opacity_logits"], jnp.ones_like(state.alive))
     optimizer = state.optimizer._replace(inner_states=inner)

@@ -135,7 +135,8 @@ def evaluate_held_out(snapshot: Snapshot, views: Views, *, config: RefineConfig,
     evaluated already."""
     if snapshot.evaluated:
         return snapshot
-    scene, errors = snapshot.scene, []
+    state, errors = snapshot.state, []
+    scene = state.shown(state.parameters)
     for index in range(0, views.rgb.shape[0], config.views.held_out_every):
         while True:
             frame = rasterize(scene, camera_of(views, index), config=raster, buffers=_buffers(snapshot))
@@ -148,6 +149,6 @@ def evaluate_held_out(snapshot: Snapshot, views: Views, *, config: RefineConfig,
     psnr = -10 * np.log10(max(np.mean(errors), 1e-10))
     curves = snapshot.curves
     rows = {name: getattr(curves, name) for name in ("psnr", "count")}
-    found = {"psnr": psnr, "count": float(snapshot.state.alive.sum())}
+    found = {"psnr": psnr, "count": float(state.alive.sum() + state.still.scene.alive.sum())}
     added = {name: np.concatenate([rows[name], [[snapshot.step, value]]]) for name, value in found.items()}
     return snapshot.replace(curves=curves.replace(**added))

@@ -42,8 +42,8 @@ def _relocate(state: RefineState, key: jax.Array, *, config: DensifyConfig):
     parameters, alive = state.parameters, state.alive
     count = alive.shape[0]
     opacity = jax.nn.sigmoid(parameters["opacity_logits"])
-    faint = alive & ~state.fixed & (opacity <= config.prune_opacity)
-    living = alive & ~state.fixed & ~faint  # a fixed one shares its place with none
+    faint = alive & (opacity <= config.prune_opacity)
+    living = alive & ~faint
     grow = jnp.ceil(GROWTH * jnp.sum(alive))
     slots = (faint | (~alive & (jnp.cumsum(~alive) <= grow))) & jnp.any(living)
     weights = jnp.cumsum(jnp.where(living, opacity, 0.0))

@@ -7,8 +7,7 @@ from flax import struct
 
 from rein3d_jax.rasterize import RasterizeConfig, allocate
 from rein3d_jax.refine.config import RefineConfig
-from rein3d_jax.refine.parameters import join_parameters, with_sh_degree
-from rein3d_jax.refine.state import RefineState, initial_state
+from rein3d_jax.refine.state import RefineState, Still, initial_state
 from rein3d_jax.refine.views import Views, camera_of
 from rein3d_jax.scene import Gaussians
 
@@ -39,7 +38,7 @@ class Snapshot:
     @property
     def scene(self) -> Gaussians:
         """The Gaussians as they are now."""
-        return join_parameters(self.state.parameters, self.state.alive)
+        return self.state.scene
 
     @property
     def step(self) -> int:
@@ -53,15 +52,21 @@ class Snapshot:
 
 
 def first_snapshot(
-    gaussians: Gaussians, views: Views, *, extent: float, config: RefineConfig, raster: RasterizeConfig, fixed=None
+    gaussians: Gaussians,
+    views: Views,
+    *,
+    extent: float,
+    config: RefineConfig,
+    raster: RasterizeConfig,
+    still: Still | None = None,
 ) -> Snapshot:
-    """The refinement of `gaussians` before its first step. `extent` is the scene's size in metres; `fixed` (n,) bool
-    or None are the Gaussians that stay as they are."""
-    state = initial_state(with_sh_degree(gaussians, config.sh_degree), config, extent=extent, fixed=fixed)
+    """The refinement of `gaussians` before its first step. `extent` is the scene's size in metres; `still` is what
+    stays as it is, or None."""
+    state = initial_state(gaussians, config, extent=extent, still=still)
     chosen = np.unique(np.linspace(0, views.rgb.shape[0] - 1, _ALLOCATED_BY).astype(int))
     cameras = [camera_of(views, int(i)) for i in chosen]
     # Without steps nothing is rendered.
-    scene = join_parameters(state.parameters, state.alive)
+    scene = state.shown(state.parameters)
     buffers = allocate(scene, cameras, config=raster, slack=1.25) if config.steps else jnp.zeros(4, jnp.int32)
     rows, total = np.zeros((0, 2)), np.zeros(())
     return Snapshot(state, jnp.array(buffers), Curves(rows, rows, rows, total, total, total), "")
@@ -71,5 +76,5 @@ def blank_snapshot(config: RefineConfig) -> Snapshot:
     """A snapshot's structure and dtypes, with which to read one back."""
     one, sh = jnp.ones(1), jnp.zeros((1, 1, 3))
     scene = Gaussians(jnp.zeros((1, 3)), jnp.zeros((1, 3)), jnp.eye(1, 4), one, sh, one > 0)
-    state = initial_state(with_sh_degree(scene, config.sh_degree), config, extent=1.0)
+    state = initial_state(scene, config, extent=1.0)
     return Snapshot(state, jnp.zeros(4, jnp.int32), Curves(*[np.zeros(0)] * 6), "")

@@ -11,7 +11,7 @@ from flax import struct
 from rein3d_jax.rasterize import Buffers, RasterizeConfig, rasterize
 from rein3d_jax.refine.config import RefineConfig
 from rein3d_jax.refine.losses import photometric_loss
-from rein3d_jax.refine.parameters import join_parameters, make_optimizer
+from rein3d_jax.refine.parameters import make_optimizer
 from rein3d_jax.refine.relocate import wander
 from rein3d_jax.refine.state import RefineState
 from rein3d_jax.refine.views import Views, camera_of
@@ -49,10 +49,6 @@ def _visible_degrees(gradients, step, config):
     return gradients | {"sh_rest": gradients["sh_rest"] * active[:, None]}
 
 
-def _unless(fixed, update):
-    return jnp.where(fixed.reshape(-1, *[1] * (update.ndim - 1)), 0.0, update)
-
-
 def _mean(values, alive):
     return jnp.sum(jnp.where(alive, values, 0.0)) / jnp.maximum(jnp.sum(alive), 1)
 
@@ -71,14 +67,16 @@ def batch_sums(
 
     def loss(parameters, offset, view):
         """Of a single view (leading axis 1), and the sizes of buffers: needed, overflow."""
-        gaussians = join_parameters(parameters, state.alive)
+        gaussians = state.shown(parameters)
+        offset = jnp.pad(offset, ((0, len(gaussians.alive) - len(offset)), (0, 0)))
         frame = rasterize(gaussians, camera_of(view, 0), config=raster, buffers=buffers, means2d_offset=offset)
         image = frame.rgb + (1 - frame.alpha[..., None]) * backdrop
         value = photometric_loss(image, view.rgb[0], view.weight[0], ssim_weight=weight.ssim)
         if weight.opacity > 0:
-            value += weight.opacity * _mean(jax.nn.sigmoid(parameters["opacity_logits"]), state.alive)
+            value += weight.opacity * _mean(jax.nn.sigmoid(gaussians.opacity_logits), gaussians.alive)
         if weight.scale > 0:
-            value += weight.scale * _mean(jnp.mean(jnp.exp(parameters["log_scales"]), -1), state.alive) / state.extent
+            size_of_one = jnp.mean(jnp.exp(gaussians.log_scales), -1)
+            value += weight.scale * _mean(size_of_one, gaussians.alive) / state.extent
         return value, (frame.needed, frame.overflow)
 
     def one_view(total, view):
@@ -115,19 +113,20 @@ def update(
     updates = updates | {"means": updates["means"] * state.extent}
     if config.densification == "mcmc":
         updates["means"] += wander(state, jax.random.fold_in(chance.key, state.step), config=config)
-    updates = {name: _unless(state.fixed, update) for name, update in updates.items()}
     parameters = optax.apply_updates(state.parameters, updates)
     parameters["log_scales"] = jnp.maximum(parameters["log_scales"], state.floor[:, None])
-    moved = state.replace(
-        parameters=parameters,
-        optimizer=optimizer,
-        gradient_sum=state.gradient_sum + sums.pull,
-        seen=state.seen + sums.seen,
-    )
-    new = jax.tree.map(lambda a, b: jnp.where(finite, a, b), moved, state)
+    moved = {
+        "parameters": parameters,
+        "optimizer": optimizer,
+        "gradient_sum": state.gradient_sum + sums.pull,
+        "seen": state.seen + sums.seen,
+    }
+    # The rest is passed on as it came: what stays still is not even copied.
+    before = {name: getattr(state, name) for name in moved}
+    new = jax.tree.map(lambda a, b: jnp.where(finite, a, b), moved, before)
     needed = jnp.where(sums.excess > 0, jnp.array(buffers) + sums.excess, needed)
     metrics = {"loss": sums.loss / sums.views, "needed": needed, "overflow": sums.overflow, "skipped": ~finite}
-    return new.replace(step=state.step + 1), metrics
+    return state.replace(**new, step=state.step + 1), metrics
 
 
 @partial(jax.jit, static_argnames=("config", "raster", "buffers"))

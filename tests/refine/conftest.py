@@ -67,8 +67,8 @@ def toy() -> Callable:
 def fit() -> Callable:
     """(a start, views, config) -> all snapshots of its refinement, with the shared key and buffers."""
 
-    def snapshots(start, views, config, fixed=None):
-        first = first_snapshot(start, views, extent=EXTENT, config=config, raster=RASTER, fixed=fixed)
+    def snapshots(start, views, config, still=None):
+        first = first_snapshot(start, views, extent=EXTENT, config=config, raster=RASTER, still=still)
         first = first.replace(buffers=jnp.array(BUFFERS))
         return list(refine(first, views, jax.random.key(0), config=config, raster=RASTER))
 

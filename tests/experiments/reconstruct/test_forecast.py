@@ -7,7 +7,7 @@ import pytest
 from experiments.config import load_config
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.diffusion_cost import restore_seconds, told_cost
-from experiments.reconstruct.forecast import _CALIBRATED, COUNTED, SecondsForecast, recalled
+from experiments.reconstruct.forecast import COUNTED, SecondsForecast, recalled
 
 CONFIG = ReconstructConfig()
 SECONDS = {stage: 10.0 + i for i, stage in enumerate(COUNTED)} | {"total": 91.0}
@@ -29,6 +29,37 @@ def test_twice_the_rows_take_longer_in_every_stage_that_sees_the_picture(tmp_pat
     assert all(large[stage] > small[stage] for stage in ("read", "lift", "restore", "write"))
 
 
+@pytest.fixture
+def as_the_model(monkeypatch):
+    """A machine as fast as the model's, by its calibration, on which any diffusion takes 10 s."""
+    monkeypatch.setattr("experiments.reconstruct.forecast._calibration", lambda: 1.0)
+    monkeypatch.setattr("experiments.reconstruct.forecast.restore_seconds", lambda *_: 10.0)
+
+
+def test_a_job_is_foreseen_to_take_longer_with_every_row(tmp_path, as_the_model):
+    """From 64 rows to 4096: first by little, since programs are most of it, at last nearly as the pixels do."""
+    quick, rows = load_config(ReconstructConfig, "quick"), (64, 128, 256, 512, 1024, 2048, 4096)
+    totals = [forecast(tmp_path, quick, rows=number).seconds()["total"] for number in rows]
+    assert totals == sorted(set(totals))
+    assert totals[1] < 1.1 * totals[0] and 2.5 * totals[-2] < totals[-1] < 4 * totals[-2]
+
+
+def test_a_machine_that_is_half_as_fast_takes_twice_as_long_for_all_of_it(tmp_path, as_the_model, monkeypatch):
+    fast = forecast(tmp_path).seconds()["total"]
+    monkeypatch.setattr("experiments.reconstruct.forecast._calibration", lambda: 2.0)
+    assert forecast(tmp_path).seconds()["total"] == pytest.approx(2 * fast, abs=1.0)  # stages are rounded
+
+
+def test_a_path_is_expected_to_open_less_often_where_the_distance_is_given(tmp_path, as_the_model):
+    closing = dataclasses.replace(CONFIG.explore, min_revealed=0.01)
+    given, photo, all_paths = (
+        forecast(tmp_path, **changes).seconds()
+        for changes in ({"explore": closing}, PHOTO | {"explore": closing}, PHOTO)
+    )
+    for stage in ("restore", "refine"):
+        assert given[stage] < photo[stage] < all_paths[stage]
+
+
 def test_what_a_job_took_is_foreseen_for_the_next_one_like_it(tmp_path):
     forecast(tmp_path).remember(SECONDS, programs(0.2))
     again = forecast(tmp_path).seconds()
@@ -38,13 +69,6 @@ def test_what_a_job_took_is_foreseen_for_the_next_one_like_it(tmp_path):
 def test_after_compiling_the_next_one_is_foreseen_to_be_faster(tmp_path):
     forecast(tmp_path).remember(SECONDS, programs(4.0))
     assert forecast(tmp_path).seconds()["total"] < SECONDS["total"] - 7 * 2
-
-
-@pytest.fixture
-def as_the_model(monkeypatch):
-    """A machine as fast as the model's, by its calibration, on which any diffusion takes 10 s."""
-    monkeypatch.setattr("experiments.reconstruct.forecast._calibration", lambda: _CALIBRATED)
-    monkeypatch.setattr("experiments.reconstruct.forecast.restore_seconds", lambda *_: 10.0)
 
 
 SMALL, LARGER = (

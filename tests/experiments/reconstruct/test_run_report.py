@@ -158,6 +158,7 @@ def test_doubt_is_shown_where_there_is_any(run):
 
 def test_a_page_that_would_be_too_large_shows_a_lighter_refined_scene_alone(run, monkeypatch):
     whole = viewer_page(run)
+    assert len(whole.encode()) + viewer._LARGEST * 4 / 3 < 25e6  # base64, beside the page's own code
     assert {"Coarse", "Refined"} <= set(re.findall(r'"name": "(\w+)"', whole))
     monkeypatch.setattr(viewer, "_LARGEST", 20_000)
     small = viewer_page(run)
