@@ -22,6 +22,7 @@ from experiments.command import CommandParser
 from experiments.compiled_programs import forget_when_many
 from experiments.config import load_config
 from experiments.evaluate.room import EvaluationRoom, RoomSource, room_sources
+from experiments.reconstruct.budget import within
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.quality import is_novel, render_views
 from rein3d_jax.evaluate.metrics import psnr
@@ -38,6 +39,7 @@ from rein3d_jax.scene import Gaussians
 RECIPE = "quick"
 SIZE = ("input.height=128", "restore.height=128", "lift.share=1.0", "refine.views.size=64", "refine.steps=200",
         "refine.evaluate_every=200")  # fmt: skip
+WHOLE = ("input.height=256", "restore.height=256", "lift.share=0.99", "lift.worth=0", "input.upsample=none")
 NO_LAYERS = ("peel.room=false", "peel.outside=false")
 EVERY_PATH = ("explore.min_revealed=0",)
 GROWING = ("refine.densification=default", "refine.densify.start=25", "refine.densify.every=25",
@@ -75,6 +77,7 @@ def tables() -> dict[str, dict[str, tuple[str, ...]]]:
             "share 0.25": ("lift.share=0.25",),
             "share 0.15": ("lift.share=0.15",),
         },
+        "tolerance": {f"{decibels} dB": (*WHOLE, f"budget.tolerance={decibels}") for decibels in (0, 0.1, 0.2, 0.5, 1)},
         "steps": {f"{steps} steps": (f"refine.steps={steps}",) for steps in (0, 50, 150, 400, 1000, 2000)},
         "seeds": {
             f"{kind}, seed {seed}{again}": (*GROWING, f"refine.densification={kind}", f"seed={seed}")
@@ -173,7 +176,8 @@ def measure(variants: dict[str, tuple[str, ...]], sources: list[RoomSource]) -> 
     for source in sources:
         bench = Bench(source)
         for name, keys in variants.items():
-            found[name].append(bench.row(load_config(ReconstructConfig, RECIPE, [*SIZE, *keys])))
+            config = load_config(ReconstructConfig, RECIPE, [*SIZE, *keys])
+            found[name].append(bench.row(within(config, config.budget)))
             print(source.name, name, found[name][-1], flush=True)
             forget_when_many()
     return found

@@ -5,6 +5,7 @@ A leaf of the partition becomes one Gaussian with the leaf's mean colour. Its mi
 along it, and from where it was lifted it is as large beside its neighbours as a pixel's splat beside a pixel's.
 """
 
+import dataclasses
 import math
 from functools import partial
 
@@ -49,6 +50,7 @@ def lift_adaptively(
         return lift(panorama, world_from_camera, select, config=config)
     capacity = capacity_of(*panorama.distance.shape, config)
     distance, known = _prepared(panorama, config)
+    config = dataclasses.replace(config, snap_edges=False)  # the rest is one program, whether edges were snapped or not
     wanted = known & select
     leaves = partition(leaf_costs(panorama.rgb, distance, wanted, config=config), wanted, capacity, config.worth)
     return _gaussians_of(leaves, panorama.rgb, distance, known, world_from_camera, config)

@@ -1,6 +1,7 @@
 """The trained network of the recipe's restorer, read from restore.weights."""
 
 import hashlib
+from functools import cache
 from pathlib import Path
 
 import jax
@@ -71,13 +72,17 @@ def _learned(config: RestoreConfig) -> Learned:
         network = NetworkConfig(**sizes)
     except TypeError as error:
         raise InputError(f"{path} names sizes that this network does not have: train it again") from error
-    wanted = jax.eval_shape(lambda: initial_parameters(jax.random.key(0), network))
-    if _shapes(wanted) != _shapes(parameters):
+    if _wanted(network) != _shapes(parameters):
         raise InputError(f"{path} does not hold the arrays of its own network's sizes: train it again")
     times, rest = divmod(config.height, network.rows)
     if rest or times & (times - 1):
         raise InputError(f"restore.height {config.height} must be {network.rows} times a power of 2 for {path}")
     return Learned(parameters, network)
+
+
+@cache  # it is asked before a job's long part and in it, and traces the whole network
+def _wanted(network: NetworkConfig) -> dict:
+    return _shapes(jax.eval_shape(lambda: initial_parameters(jax.random.key(0), network)))
 
 
 def _shapes(tree) -> dict:

@@ -12,7 +12,9 @@ from rein3d_jax.pipeline.survey import Survey
 from rein3d_jax.restore import Background, Restorer
 from rein3d_jax.scene import Gaussians
 
-_LEAF = 4  # pixels that a Gaussian of the layer spans at most: with 16 it has 1 % fewer, and compiles thrice as long
+# Pixels that a Gaussian of the layer spans at most, where it has not the panorama's size and the lift's own programs do
+# not fit it: with 16 it has 1 % fewer, and compiles thrice as long.
+_LEAF = 4
 
 
 def peel_scene(
@@ -20,15 +22,17 @@ def peel_scene(
 ) -> Gaussians:
     """The coarse scene of `known` and the layers that stages.peel names. The room's is made up by
     `restore`, not upsampled, and needs its `background`: where what was seen is no box, there is none."""
+    scene, leaf = known.coarse, stages.lift.max_leaf_side
+    if stages.restore.height != len(known.panorama.rgb):
+        leaf = min(leaf, _LEAF)
     # A guess has no edges to mend.
-    scene, config = known.coarse, dataclasses.replace(stages.lift, snap_edges=False)
+    config = dataclasses.replace(stages.lift, snap_edges=False, max_leaf_side=leaf)
     if stages.peel.room and background is not None and stages.restore.method != "none":
         taken = without_things(known.panorama, background.shell, origin_pose(), rows=stages.restore.height)
         _, hidden = behind_things(taken, taken, background.shell)
         if hidden.any():  # in an empty room nothing is to be made up
             layer, hidden = behind_things(taken, restore(taken, key), background.shell)
-            leaves = dataclasses.replace(config, max_leaf_side=min(config.max_leaf_side, _LEAF))
-            new = lift_adaptively(layer, origin_pose(), hidden, config=leaves)
+            new = lift_adaptively(layer, origin_pose(), hidden, config=config)
             scene, _ = joined_in(scene, new, grow=True)
     if stages.peel.outside:
         outside = outside_of(known.panorama, known.trajectories.positions.reshape(-1, 3))
