@@ -14,9 +14,9 @@ from rein3d_jax.settings import Settings, setting
 _LEAST, _OF_NETWORK, _OF_A_PIXEL, _OF_A_GAUSSIAN = 2_100_000_000, 650_000_000, 160, 480
 
 
-# What a dB of tolerance is in the stages' own limits. Of lift.worth at 256 rows: 0.005, 0.01, 0.02, 0.05 lose 0.01,
-# 0.20, 0.45, 0.95 dB in eight rooms, and less at more rows (benchmarks/README.md, "No more than a scene needs").
-_WORTH, _REVEALED = 0.05, 0.025
+# What a dB of tolerance is in the stages' own limits. Of lift.worth: 0.005, 0.01, 0.025, 0.05 lose 0.06, 0.25, 0.66 and
+# 1.05 dB in eight rooms at 256 rows (benchmarks/README.md, "No more than a scene needs").
+_WORTH, _REVEALED = 0.035, 0.025
 _ADAPTIVE = 0.99  # of a share of 1, which lifts every pixel whatever it is worth
 
 
