@@ -54,7 +54,7 @@ def _error(actual, truth):
 
 
 def _height(sigma: float) -> int:
-    """Rows of a panorama in which the splat's sigma is 5 pixels or more: the filter then adds under 2 %."""
+    """Rows of a panorama in which the splat's sigma is 5 pixels or more: the filter leaves that as it is."""
     return int(min(2048, max(64, 2 ** np.ceil(np.log2(6 * np.pi / sigma)))))
 
 
@@ -65,16 +65,15 @@ def footprint_errors(latitude: float, sigma: float, seed: int = 0) -> dict:
     axes = np.array([sigma, sigma / 2, sigma / 2])  # east, north, depth
     points = frame[0] + (rng.normal(size=(SAMPLES, 3)) * axes) @ np.stack([frame[1], frame[2], frame[0]])
     truth_rays = points / np.linalg.norm(points, axis=1, keepdims=True)
-    # A splat's alpha is cut at 1/255 and its filter adds variance; sampled points get both.
+    # A splat's alpha is cut at 1/255, and so are sampled points.
     height = _height(sigma)
     rays = np.asarray(pixel_rays(height, 2 * height), np.float64).reshape(-1, 3)
     area = np.asarray(pixel_solid_angles(height, 2 * height), np.float64).ravel()
     ours = _ours(frame, axes, height).ravel() * area
     plain = _plain_ewa(np.radians(latitude), axes, height).ravel() * area
-    pixel = 0.3 * (np.pi / height) ** 2 * np.eye(2)
     cut = 1 - ALPHA_CUT / OPACITY * (1 + np.log(OPACITY / ALPHA_CUT))  # second moment of a Gaussian up to the cut
     share = cut / (1 - ALPHA_CUT / OPACITY)
-    truth = (_moments(truth_rays, np.ones(SAMPLES), frame) + pixel) * share
+    truth = _moments(truth_rays, np.ones(SAMPLES), frame) * share
     return {
         "latitude": latitude,
         "sigma": sigma,
@@ -107,8 +106,8 @@ def _plain_ewa(latitude, axes, height):
     du = u - (AZIMUTH / (2 * np.pi) + 0.5) * 2 * height
     du = (du + height) % (2 * height) - height  # the nearest way round
     dv = v - (0.5 - latitude / np.pi) * height
-    variance_u = (axes[0] / np.cos(latitude) / pitch) ** 2 + 0.3
-    variance_v = (axes[1] / pitch) ** 2 + 0.3
+    variance_u = (axes[0] / np.cos(latitude) / pitch) ** 2
+    variance_v = (axes[1] / pitch) ** 2
     alpha = OPACITY * np.exp(-0.5 * (du**2 / variance_u + dv**2 / variance_v))
     return np.where(alpha < ALPHA_CUT, 0.0, alpha)
 

@@ -10,7 +10,7 @@ import optax
 from benchmarks.engines.engine import Engine
 from benchmarks.workloads import Workload
 from rein3d_jax.conventions import PINHOLE
-from rein3d_jax.rasterize import RasterizeConfig, allocate, rasterize
+from rein3d_jax.rasterize import ADDED, RasterizeConfig, allocate, rasterize
 from rein3d_jax.rasterize.composite import composite_chunks
 from rein3d_jax.rasterize.cull import gather_in_view, in_view
 from rein3d_jax.rasterize.pixels import from_tiles
@@ -20,7 +20,8 @@ from rein3d_jax.refine import RefineConfig
 from rein3d_jax.refine.parameters import join_parameters, make_optimizer, split_parameters
 from rein3d_jax.scene import Camera, Gaussians
 
-CONFIG = RasterizeConfig(antialias=False, distance=False)  # what the peers composite: colour and alpha
+# What the peers composite, colour and alpha, by gsplat's filter.
+CONFIG = RasterizeConfig(antialias=False, filter=ADDED, filter_variance=0.3, distance=False)
 SH_DC = 0.28209479177387814
 
 

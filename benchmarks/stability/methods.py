@@ -31,7 +31,7 @@ from rein3d_jax.networks.trained import read_network
 from rein3d_jax.pipeline.peel_scene import peel_scene
 from rein3d_jax.pipeline.stages import origin_pose
 from rein3d_jax.pipeline.survey import Survey, lift_scene, room_background, with_distance
-from rein3d_jax.rasterize import Buffers, RasterizeConfig, bucket, render
+from rein3d_jax.rasterize import ADDED, Buffers, RasterizeConfig, bucket, render
 from rein3d_jax.restore import Background, Restorer, TrainedNetwork, restorer
 from rein3d_jax.restore.fills import restore_telea
 from rein3d_jax.scene import Camera, Gaussians, Panorama, Video
@@ -40,7 +40,7 @@ SMALL_DRAFT = ("restore.height=64", "lift.share=1.0")
 BALLS = LiftConfig(
     footprint=1.0, plain_footprint=1.0, sharpen=0.0, steepest=0.0, thickness=1.0, snap_edges=False
 )  # fmt: skip
-CLASSIC = RasterizeConfig(antialias=False, filter_variance=0.3)  # 3DGS
+CLASSIC = RasterizeConfig(antialias=False, filter=ADDED, filter_variance=0.3)  # 3DGS
 # By capacity: the same for all scenes, so that the rasterizer compiles once.
 _BUFFERS: dict[tuple, Buffers] = {}
 

@@ -49,9 +49,10 @@ def _viewer(run: RunFolder) -> bytes:
         scenes["Refined"] = "/refined.spz"
     elif (run.path / "stages" / "unfinished.npz").exists():
         scenes["So far"] = "/sofar.spz"
+    raster = run.config.rasterize
     page = render_viewer(
         scenes, encode_jpeg(np.asarray(run.panorama.rgb)), room_plan(run.trajectories, run.config.explore, []),
-        backdrop=np.asarray(run.backdrop), filter_variance=run.config.rasterize.filter_variance,
+        backdrop=np.asarray(run.backdrop), pixel_filter=(raster.filter, raster.filter_variance),
     )  # fmt: skip
     return page.encode()
 

@@ -13,7 +13,7 @@ class LiftConfig(Settings):
     opacity: float = setting(0.99, "opacity of every Gaussian", within="(0, 1)")
     footprint: float = setting(0.75, "sigma over half a pixel's diagonal where there is detail", within="(0, inf)")
     plain_footprint: float = setting(1.15, "the same where the picture is plain", within="(0, inf)")
-    sharpen: float = setting(1.25, "share of what splats blur away that their colours make up for", within="[0, inf)")
+    sharpen: float = setting(0.75, "share of what splats blur away that their colours make up for", within="[0, inf)")
     steepest: float = setting(6.0, "tangent of incidence up to which splats are stretched; 0: never", within="[0, inf)")
     thickness: float = setting(0.3, "a splat's extent across its surface, over its width", within="(0, inf)")
     share: float = setting(1.0, "Gaussians for each pixel at most, larger ones where it is smooth", within="(0, 1]")

@@ -6,15 +6,20 @@ from rein3d_jax.conventions import FAR, NEAR
 from rein3d_jax.errors import InputError
 from rein3d_jax.settings import Settings, setting
 
+LEAST, ADDED = "least", "added"
+
 
 @dataclasses.dataclass(frozen=True)
 class RasterizeConfig(Settings):
     """How Gaussians become a picture."""
 
     antialias: bool = setting(True, "scale opacity by what the screen-space filter spread out (Mip-Splatting, eq. 9)")
+    filter: str = setting(
+        LEAST, "that widens footprints: to a pixel at least, or by a pixel each", among=(LEAST, ADDED)
+    )
     distance: bool = setting(True, "composite the distance too; without it a frame has none, and compositing is faster")
-    # 0.1 is about a pixel itself (a box has 1/12), as in Mip-Splatting; 3DGS' 0.3 blurs more.
-    filter_variance: float = setting(0.1, "variance added to every footprint", within="(0, inf)", unit="pixels^2")
+    # 1/12 is a pixel's own, a box's; Mip-Splatting adds 0.1, 3DGS 0.3.
+    filter_variance: float = setting(1 / 12, "variance of the filter", within="(0, inf)", unit="pixels^2")
     near: float = setting(NEAR, "distance below which nothing is drawn", within="(0, inf)", unit="metres")
     far: float = setting(FAR, "distance beyond which nothing is drawn", within="(0, inf]", unit="metres")
     # 8 x 8 beats 16 x 16 for pixel-sized splats.

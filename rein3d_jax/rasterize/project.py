@@ -6,7 +6,8 @@ Both cameras evaluate a splat at a pixel as alpha = exp(log_opacity - |axes (fea
 - an equirectangular pixel's feature is its unit ray in camera axes, and `axes` whitens the covariance on
   the tangent plane at the Gaussian's own direction, with a third row along that direction that makes the
   measure the chord between the two rays: it grows all the way to the antipode, where the tangent plane
-  alone would show a ghost. No longitude or latitude enters, so poles and seam are points like any other.
+  alone would show a ghost. Longitude and latitude enter by the filter's shape alone (a column is narrow at a
+  pole), so poles and seam are points like any other.
 """
 
 import jax
@@ -19,6 +20,7 @@ from rein3d_jax.geometry.poses import invert
 from rein3d_jax.geometry.safe import safe_norm
 from rein3d_jax.geometry.spherical_harmonics import rgb_from_sh
 from rein3d_jax.rasterize.config import RasterizeConfig
+from rein3d_jax.rasterize.pixel_filter import filtered
 from rein3d_jax.scene import Camera, Gaussians
 
 # Beyond this angular size (radians, one sigma) a footprint is no longer an ellipse on the sphere; up to it,
@@ -51,19 +53,6 @@ def _whitening(cov_xx, cov_xy, cov_yy, det):
     return jnp.stack([first, second], axis=-2)
 
 
-def _filtered(spread, variance, antialias):
-    """Footprint (n, 2, 3) -> filtered covariance (xx, xy, yy, determinant), opacity factor sqrt(det / det_filtered)."""
-    xx, xy, yy = (jnp.sum(spread[:, i] * spread[:, j], axis=-1) for i, j in ((0, 0), (0, 1), (1, 1)))
-    # xx yy - xy^2 would lose a needle to rounding, and the filter with it: the cross product does not.
-    normal = jnp.cross(spread[:, 0], spread[:, 1])
-    det = jnp.sum(normal * normal, axis=-1) + variance * (xx + yy) + variance**2
-    covariance = (xx + variance, xy, yy + variance, det)
-    if not antialias:
-        return covariance, 0.0
-    # A splat with no area has no opacity left; the floor keeps its logarithm finite.
-    return covariance, jnp.log(jnp.maximum(safe_norm(normal), 1e-12) * jax.lax.rsqrt(det))
-
-
 def _pinhole(points, spread, camera, config):
     """Mean (n, 2), axes (n, 2, 2), log opacity factor, support extents per unit sigma (n, 2), in range."""
     z = points[:, 2]
@@ -77,20 +66,22 @@ def _pinhole(points, spread, camera, config):
     high = (jnp.array([camera.width, camera.height]) - camera.centre) / camera.focal + margin
     slope = jnp.clip(jnp.stack([x, y], axis=-1), low, high)
     rows = (spread[:, :2] - slope[..., None] * spread[:, 2:]) * (camera.focal[:, None] / safe_z[:, None, None])
-    covariance, factor = _filtered(rows, config.filter_variance, config.antialias)
+    covariance, factor = filtered(rows, config.filter_variance, config=config)
     xx, _, yy, _ = covariance
     return mean, _whitening(*covariance), factor, jnp.sqrt(jnp.stack([xx, yy], axis=-1)), in_range
 
 
-def _tangent_frame(direction):
-    """Two unit vectors (n, 2, 3) orthogonal to `direction` (n, 3); continuous except at one meridian sign
-    flip (Duff et al. 2017), where only their common rotation, which no result depends on, jumps."""
-    x, y, z = jnp.moveaxis(direction, -1, 0)
-    sign = jnp.where(z >= 0, 1.0, -1.0)
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    first = jnp.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=-1)
-    return jnp.stack([first, jnp.stack([b, sign + y * y * a, -y], axis=-1)], axis=-2)
+def _pixel_frame(direction, pitch):
+    """Unit vectors (n, 2, 3) along a panorama's rows and columns at `direction` (n, 3), and a column's width there
+    (n,) over a row's height, `pitch`: 1 at a pole itself, where rows have no direction."""
+    x, _, z = jnp.moveaxis(direction, -1, 0)
+    cos_latitude = safe_norm(jnp.stack([x, z], axis=-1))
+    at_pole = cos_latitude < 1e-6
+    safe = jnp.where(at_pole, 1.0, cos_latitude)
+    along = jnp.stack(
+        [jnp.where(at_pole, 1.0, z / safe), jnp.zeros_like(x), jnp.where(at_pole, 0.0, -x / safe)], axis=-1
+    )
+    return jnp.stack([along, jnp.cross(along, direction)], axis=-2), jnp.maximum(cos_latitude, 1 - cos_latitude / pitch)
 
 
 def _curved(rows, radial):
@@ -118,15 +109,15 @@ def _equirectangular(points, spread, distance, camera, config):
     in_range = (distance > config.near) & (distance < config.far)
     safe_distance = jnp.where(in_range, distance, 1.0)
     direction = jnp.where(in_range[:, None], points, jnp.array([0.0, 0.0, 1.0])) / safe_distance[:, None]
-    frame = _tangent_frame(direction)
+    frame, width = _pixel_frame(direction, jnp.pi / camera.height)
     rows = jnp.einsum("nij,njk->nik", frame, spread, precision="highest") / safe_distance[:, None, None]
     radial = jnp.einsum("ni,nij->nj", direction, spread, precision="highest") / safe_distance[:, None]
     rows = _curved(rows, radial)
-    # The filter is round on the sphere, with the pitch of a row: columns crowd at the poles, detail does not.
-    pixel = (jnp.pi / camera.height) ** 2
-    covariance, factor = _filtered(rows, config.filter_variance * pixel, config.antialias)
-    xx, xy, yy, _ = covariance
-    axes = jnp.einsum("nij,njk->nik", _whitening(*covariance), frame, precision="highest")
+    # A pixel is as wide as its column is there: in units of it the filter is round.
+    rows = jnp.stack([rows[:, 0] / width[:, None], rows[:, 1]], axis=1)
+    (xx, xy, yy, det), factor = filtered(rows, config.filter_variance * (jnp.pi / camera.height) ** 2, config=config)
+    xx, xy, det = xx * width**2, xy * width, det * width**2
+    axes = jnp.einsum("nij,njk->nik", _whitening(xx, xy, yy, det), frame, precision="highest")
     sigma = jnp.sqrt((xx + yy) / 2 + jnp.sqrt(((xx - yy) / 2) ** 2 + xy**2 + 1e-30))
     axes = jnp.concatenate([axes, (direction / sigma[:, None])[:, None]], axis=1)
     return direction, axes, factor, sigma[:, None], in_range & (sigma < _MAX_ANGULAR_SIGMA)
@@ -204,7 +195,8 @@ def _feature_offset(pixels, points, distance, camera):
     if camera.model != EQUIRECTANGULAR:
         return pixels
     direction = jax.lax.stop_gradient(points / jnp.maximum(distance, 1e-12)[:, None])
-    return jnp.einsum("ni,nij->nj", pixels, _tangent_frame(direction)) * (jnp.pi / camera.height)
+    pitch = jnp.pi / camera.height
+    return jnp.einsum("ni,nij->nj", pixels, _pixel_frame(direction, pitch)[0]) * pitch
 
 
 def _finite(gaussians: Gaussians) -> jax.Array:

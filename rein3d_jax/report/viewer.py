@@ -26,7 +26,7 @@ _POLICY = (
 _SERVED_POLICY = _POLICY.replace("connect-src", "connect-src 'self'")
 # One script, in this order.
 _CODE = ("place", "draw_list", "splats", "picture", "map", "hands", "keepsakes", "headset", "walk")
-_FILTER_VARIANCE = 0.3  # pixels^2, RasterizeConfig's; pass the scene's own where it was made with another
+_PIXEL_FILTER = ("added", 0.3)  # 3DGS'; a scene of ours comes with its RasterizeConfig's
 
 
 def render_viewer(
@@ -36,12 +36,13 @@ def render_viewer(
     *,
     title: str = "Your room in 3D",
     backdrop: Sequence[float] = (0.5, 0.5, 0.5),
-    filter_variance: float = _FILTER_VARIANCE,
+    pixel_filter: tuple[str, float] = _PIXEL_FILTER,
 ) -> str:
     """HTML of the whole page. `scenes`: name -> the bytes of an SPZ file, the last one shown first; or all of them
     paths on the server that the page comes from, fetched when they are shown. `panorama`: a JPEG or PNG file.
     `floor_map`: walls, paths, and the safe area, which the visitor does not leave. `backdrop`: the sRGB colour of what
-    no splat covers. Raises ValueError for a scene or picture of another format."""
+    no splat covers. `pixel_filter`: the rasterizer's kind of filter, and its variance in
+    pixels^2. Raises ValueError for a scene or picture of another format."""
     served = all(isinstance(data, str) for data in scenes.values())
     if not scenes or not (served or all(_is_spz(data) for data in scenes.values())):
         raise ValueError("a viewer's scenes are one SPZ file or more, or all of them paths on its server")
@@ -55,7 +56,7 @@ def render_viewer(
         "safe": _points(floor_map.safe),
         "paths": [_points(path) for path in floor_map.paths],
         "backdrop": [float(value) for value in backdrop],
-        "filterVariance": filter_variance,
+        "pixelFilter": dict(zip(("kind", "variance"), pixel_filter, strict=True)),
     }
     parts = {
         "title": escape(title),

@@ -8,7 +8,7 @@ import pytest
 from rein3d_jax.geometry.covariance import scaled_axes
 from rein3d_jax.geometry.pinhole import pixels_from_points
 from rein3d_jax.geometry.poses import equirectangular_camera, invert, pinhole_camera, upright
-from rein3d_jax.rasterize import RasterizeConfig
+from rein3d_jax.rasterize import ADDED, LEAST, RasterizeConfig
 from rein3d_jax.rasterize.project import project
 from rein3d_jax.scene import Gaussians
 
@@ -40,12 +40,10 @@ def second_moments(samples: np.ndarray, centre: np.ndarray) -> np.ndarray:
     return np.einsum("sni,snj->nij", offset, offset) / len(offset)
 
 
-def unfiltered(splats, filter_variance: float) -> np.ndarray:
-    """The covariance that the whitening rows stand for, less the filter's."""
-    rows = np.asarray(splats.axes, np.float64)[:, :2]
-    inverse = np.linalg.pinv(rows)
-    plane = inverse @ rows  # the projector onto the plane that the rows span
-    return inverse @ np.swapaxes(inverse, 1, 2) - filter_variance * plane
+def covariance_of(splats) -> np.ndarray:
+    """The covariance that the whitening rows stand for."""
+    inverse = np.linalg.pinv(np.asarray(splats.axes, np.float64)[:, :2])
+    return inverse @ np.swapaxes(inverse, 1, 2)
 
 
 def close_to(actual: np.ndarray, expected: np.ndarray) -> None:
@@ -54,27 +52,39 @@ def close_to(actual: np.ndarray, expected: np.ndarray) -> None:
     assert np.all(error < 0.05), error
 
 
-@pytest.mark.parametrize("antialias", [True, False])
-def test_a_panorama_footprint_is_the_spread_of_directions(antialias) -> None:
+def at_latitudes() -> np.ndarray:
+    """Directions (4, 3) at LATITUDES."""
+    across, flat = 0.7 + np.arange(4), np.cos(LATITUDES)
+    return np.stack([flat * np.cos(across), flat * np.sin(across), np.sin(LATITUDES)], axis=-1)
+
+
+def test_a_panorama_footprint_is_the_spread_of_directions() -> None:
     """At the pole as on the horizon: a plain EWA in longitude and latitude fails there."""
-    across = 0.7 + np.arange(4)
-    flat = np.cos(LATITUDES)
-    directions = np.stack([flat * np.cos(across), flat * np.sin(across), np.sin(LATITUDES)], axis=-1)
-    gaussians = splats_at(directions)
-    camera = equirectangular_camera(upright(jnp.zeros(3), 0.2), 512)
-    config = RasterizeConfig(antialias=antialias)
-    splats = run(gaussians, camera, config=config)
+    gaussians = splats_at(at_latitudes())
+    camera = equirectangular_camera(upright(jnp.zeros(3), 0.2), 4096)  # sigmas of 5 pixels and more: no filter
+    splats = run(gaussians, camera, config=RasterizeConfig())
     points = sampled_points(gaussians, camera.world_from_camera)
     rays = points / jnp.linalg.norm(points, axis=-1, keepdims=True)
-    moments = second_moments(rays, np.asarray(splats.mean))
-    pixel = config.filter_variance * (np.pi / camera.height) ** 2
-    close_to(unfiltered(splats, pixel), moments)
+    close_to(covariance_of(splats), second_moments(rays, np.asarray(splats.mean)))
 
-    # Antialiasing keeps opacity x area: the filtered footprint is larger, so its peak is lower.
-    major, minor = np.linalg.eigvalsh(moments)[:, :0:-1].T
-    kept = np.sqrt(major * minor / ((major + pixel) * (minor + pixel))) if antialias else 1.0
-    peak = np.exp(splats.log_opacity) / jax.nn.sigmoid(2.0)
-    np.testing.assert_allclose(peak, kept * np.ones(4), rtol=0.02)  # Monte Carlo, as above
+
+@pytest.mark.parametrize("kind", [LEAST, ADDED])
+def test_a_speck_in_a_panorama_is_as_wide_as_a_column_is_there(kind) -> None:
+    gaussians = splats_at(at_latitudes())
+    gaussians = gaussians.replace(log_scales=gaussians.log_scales - 12)
+    camera = equirectangular_camera(upright(jnp.zeros(3)), 512)
+    splats = run(gaussians, camera, config=RasterizeConfig(antialias=False, filter=kind))
+    # Along rows, along columns and along the ray, in world axes as a level camera at the origin has them.
+    up, ray = np.array([0.0, 0.0, 1.0]), np.asarray(at_latitudes())
+    along = np.cross(up, ray) / np.linalg.norm(np.cross(up, ray), axis=-1, keepdims=True)
+    pixel = RasterizeConfig.filter_variance * (np.pi / 512) ** 2
+    width = np.maximum(np.cos(LATITUDES), 1 - np.cos(LATITUDES) * 512 / np.pi)  # round at the pole itself
+    expected = pixel * (
+        np.einsum("n,ni,nj->nij", width**2, along, along)
+        + np.einsum("ni,nj->nij", np.cross(ray, along), np.cross(ray, along))
+    )
+    turned = np.asarray(camera.world_from_camera, np.float64)[:3, :3]
+    np.testing.assert_allclose(turned @ covariance_of(splats) @ turned.T, expected, atol=1e-4 * pixel)  # float32 rays
 
 
 def test_a_pinhole_footprint_is_the_spread_of_pixels() -> None:
@@ -82,10 +92,10 @@ def test_a_pinhole_footprint_is_the_spread_of_pixels() -> None:
     directions = np.stack([np.ones(4), -slopes[:, 0], -slopes[:, 1]], axis=-1)
     gaussians = splats_at(directions / np.linalg.norm(directions, axis=-1, keepdims=True))
     camera = pinhole_camera(upright(jnp.zeros(3)), 512, np.pi / 2)
-    splats = run(gaussians, camera, config=RasterizeConfig(antialias=False))
+    splats = run(gaussians, camera, config=RasterizeConfig())
     points = sampled_points(gaussians, camera.world_from_camera)
     pixels = jnp.stack(pixels_from_points(points, camera.focal, camera.centre), axis=-1)
-    close_to(unfiltered(splats, RasterizeConfig.filter_variance), second_moments(pixels, np.asarray(splats.mean)))
+    close_to(covariance_of(splats), second_moments(pixels, np.asarray(splats.mean)))  # of 1 pixel and more: no filter
 
 
 def test_offsets_move_projected_means_by_pixels_and_nothing_else() -> None:

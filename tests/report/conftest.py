@@ -10,6 +10,7 @@ import pytest
 
 from rein3d_jax.io.pictures.image import encode_png
 from rein3d_jax.io.splats.spz import encode_spz
+from rein3d_jax.rasterize import RasterizeConfig
 from rein3d_jax.report.floor_map import FloorMap
 from rein3d_jax.report.viewer import render_viewer
 from rein3d_jax.scene import Gaussians
@@ -66,7 +67,8 @@ def viewer_file(room, tmp_path_factory):
     """viewer.html: the panorama, and the scene under a hostile name."""
     scene, panorama = room
     plan = FloorMap(4 * SAFE, SAFE, (SAFE[:2],), np.zeros((0, 2)))
-    html = render_viewer({HOSTILE: encode_spz(scene)}, encode_png(panorama), plan, title=HOSTILE)
+    ours = (RasterizeConfig.filter, RasterizeConfig.filter_variance)
+    html = render_viewer({HOSTILE: encode_spz(scene)}, encode_png(panorama), plan, title=HOSTILE, pixel_filter=ours)
     path = tmp_path_factory.mktemp("viewer") / "viewer.html"
     path.write_text(html, encoding="utf-8")
     return path

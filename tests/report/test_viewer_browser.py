@@ -7,9 +7,14 @@ import numpy as np
 import pytest
 
 from rein3d_jax.geometry.poses import pinhole_camera, upright
-from rein3d_jax.rasterize import RasterizeConfig, render
+from rein3d_jax.io.splats.spz import encode_spz
+from rein3d_jax.rasterize import ADDED, LEAST, RasterizeConfig, render
+from rein3d_jax.report.floor_map import FloorMap
+from rein3d_jax.report.viewer import render_viewer
+from tests.report.conftest import SAFE
 
 SIZE, FOV = 256, 70  # pixels, degrees
+VARIANCE = 10.0  # pixels^2; a splat of the room has about as much
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +52,27 @@ def test_it_shows_what_the_rasterizer_shows(page, until, room, pose):
     # SPZ's colours are in 270 steps and its sizes in steps of 6 %, the browser composites in 8 bits: a mirrored or
     # turned picture, or one in linear light, is under 20 dB.
     assert found > 30
+
+
+def test_it_widens_splats_as_the_rasterizer_does(chromium, until, room, tmp_path):
+    """Splats apart from each other, each about as large as the filter: by the other filter they are fainter."""
+    scene = room[0].replace(alive=jnp.arange(room[0].alive.size) % 101 == 0, sh=0 * room[0].sh + 1.5)
+    page = chromium.new_context(viewport={"width": SIZE, "height": SIZE}).new_page()
+    camera, found = pinhole_camera(upright(jnp.zeros(3), 0.3, 0.1), SIZE, np.radians(FOV)), {}
+    for kind in (LEAST, ADDED):
+        plan = FloorMap(4 * SAFE, SAFE, (SAFE[:2],), np.zeros((0, 2)))
+        (tmp_path / kind).with_suffix(".html").write_text(
+            render_viewer({"scene": encode_spz(scene)}, None, plan, pixel_filter=(kind, VARIANCE)), encoding="utf-8"
+        )
+        page.goto((tmp_path / kind).with_suffix(".html").as_uri(), wait_until="commit")
+        until(page, "!!globalThis.viewer && viewer.settled()")
+        shown = seen(page, until, 0, yaw=0.3, pitch=0.1)
+        for ours in (LEAST, ADDED):
+            frame, _ = render(scene, camera, config=RasterizeConfig(filter=ours, filter_variance=VARIANCE))
+            found[kind, ours] = psnr(shown, frame.rgb + 0.5 * (1 - frame.alpha[..., None]))
+    print({pair: f"{value:.1f} dB" for pair, value in found.items()})
+    for kind, other in ((LEAST, ADDED), (ADDED, LEAST)):
+        assert found[kind, kind] > found[kind, other] + 10  # dB; SPZ's steps are in both
 
 
 @pytest.mark.parametrize("pose", POSES[:3])

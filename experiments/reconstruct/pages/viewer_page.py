@@ -29,5 +29,6 @@ def viewer_page(run: Run) -> str:
             count = int(_LEFT * largest / len(last) * int(scene.alive.sum()))
             last = encode_spz(lighter_scene(scene, count), "the scene")
         scenes = {name: last}
-    plan, variance = room_plan(result.trajectories, config.explore, run.views), config.rasterize.filter_variance
-    return render_viewer(scenes, panorama, plan, backdrop=np.asarray(run.backdrop), filter_variance=variance)
+    plan, raster = room_plan(result.trajectories, config.explore, run.views), config.rasterize
+    shown = {"backdrop": np.asarray(run.backdrop), "pixel_filter": (raster.filter, raster.filter_variance)}
+    return render_viewer(scenes, panorama, plan, **shown)

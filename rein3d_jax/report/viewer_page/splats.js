@@ -20,11 +20,28 @@ function createRenderer() {
 
 function addSpark() {
   // blurAmount: the pixels^2 by which rein3d_jax widens a splat on the screen, its opacity scaled to match.
+  const { kind, variance } = data.pixelFilter;
   const added = new libraries.SparkRenderer({ renderer, onDirty: () => (needed = true), accumExtSplats: true,
-    blurAmount: data.filterVariance, minAlpha: 1 / 255, extraUniforms: { count: { value: 0 } } });
+    blurAmount: variance, minAlpha: 1 / 255, extraUniforms: { count: { value: 0 } } });
+  if (kind === "least") widenToAPixel(added);
   drawInBatches(added, new DrawList());
   scene.add(added);
   return added;
+}
+
+// Spark adds a pixel's variance to every splat's a, b, d; this is rein3d_jax.rasterize.pixel_filter's `least`.
+function widenToAPixel(added) {
+  const sum = /a \+= fullBlurAmount;\s*d \+= fullBlurAmount;\s*float det = a \* d - b \* b;/;
+  if (!sum.test(added.material.vertexShader)) throw Error("Spark's shader widens splats in another way");
+  added.material.vertexShader = added.material.vertexShader.replace(sum, `
+    float size = a + d + fullBlurAmount, v = fullBlurAmount / size, trace = (a + d) / size, q = detOrig / (size * size);
+    float squares = max(trace * trace - 2.0 * q, 0.5 * trace * trace);
+    float root = sqrt(q * q + v * v * squares + v * v * v * v), rest = v * v - q + root;
+    float scale = inversesqrt(squares + 2.0 * v * v + 2.0 * root);
+    a = scale * (trace * a + size * rest);
+    b = scale * trace * b;
+    d = scale * (trace * d + size * rest);
+    float det = size * size * root;`);
 }
 
 const bytes = (base64) => Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
