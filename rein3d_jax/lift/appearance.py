@@ -15,16 +15,15 @@ from rein3d_jax.geometry.resample import pad_sphere
 
 _PLAIN = 0.02  # of sRGB's range: rms of what is no gradient, above which the eye sees texture and no weave
 _BLUR = 0.8  # pixels, sigma: what a splat, a pixel's filter and the photo's own softness do together
-_RADIUS = 2  # pixels: of the windows
+_RADIUS = 2  # pixels: of that blur
 
 
-def splat_overlap(rgb: jax.Array, apart: jax.Array, *, detailed: float, plain: float) -> jax.Array:
+def splat_overlap(rgb: jax.Array, *, detailed: float, plain: float) -> jax.Array:
     """Sigma over half a pixel's diagonal (h, w): `plain` where the picture (h, w, 3) has no detail, `detailed`
-    where it has, and near what is `apart` (h, w) bool, where a wide splat would stand out into the open."""
+    where it has. Beside steps of distance as elsewhere: narrow splats there bring nothing nearer, and weave."""
     detail = rgb - window_sum(rgb, 1) / 9
-    power = window_sum(jnp.sum(detail**2, axis=-1), _RADIUS) / (2 * _RADIUS + 1) ** 2
-    inside = window_sum(apart.astype(rgb.dtype), _RADIUS) == 0
-    return detailed + (plain - detailed) * inside * jnp.exp(-power / _PLAIN**2)
+    power = window_sum(jnp.sum(detail**2, axis=-1), 1) / 9
+    return detailed + (plain - detailed) * jnp.exp(-power / _PLAIN**2)
 
 
 def sharpened(rgb: jax.Array, amount: float) -> jax.Array:

@@ -14,7 +14,7 @@ from rein3d_jax.lift.appearance import sharpened, splat_overlap
 from rein3d_jax.lift.config import LiftConfig
 from rein3d_jax.lift.edges import snap_edges
 from rein3d_jax.lift.splat_shape import splat_shape
-from rein3d_jax.lift.surface import beside_steps, slopes
+from rein3d_jax.lift.surface import slopes
 from rein3d_jax.scene import Gaussians
 
 
@@ -48,8 +48,7 @@ def pixel_traits(rgb: jax.Array, distance: jax.Array, known: jax.Array, config: 
     """The Traits (h, w) of a panorama's pixels; `distance` (h, w) is any positive one where none is `known`."""
     slope = slopes(distance, known)
     slope *= jnp.minimum(1.0, config.steepest / jnp.maximum(safe_norm(slope, keepdims=True), 1e-6))
-    apart = ~known | beside_steps(1 / distance, config.leaf_step)
-    wide = splat_overlap(rgb, apart, detailed=config.footprint, plain=config.plain_footprint)
+    wide = splat_overlap(rgb, detailed=config.footprint, plain=config.plain_footprint)
     return Traits(slope, wide, sharpened(rgb, config.sharpen))
 
 
