@@ -20,6 +20,7 @@ import numpy as np
 
 from experiments.command import CommandParser
 from experiments.config import load_config, toml_value
+from experiments.quick_compilation import compile_quickly
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.inputs import resolve, told_panorama
 from rein3d_jax.depth.level import LEANED, levelled
@@ -38,6 +39,7 @@ from rein3d_jax.upsample import distance_for
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where the input is at fault."""
+    compile_quickly()
     parser = CommandParser("estimate_distance", __doc__)
     parser.add_argument("--input", metavar="FILE", required=True, help="an equirectangular JPEG, PNG, EXR or HDR (2:1)")
     parser.add_argument("--output", metavar="FILE", required=True, help="the distance to write, ending in .exr")

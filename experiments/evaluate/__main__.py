@@ -32,6 +32,7 @@ from experiments.evaluate.methods import REFINED, chosen_methods, recipe_of
 from experiments.evaluate.protocols import NO_TRUTH, PROTOCOLS, Tools
 from experiments.evaluate.results import line, stored_outcome, table
 from experiments.evaluate.room import EvaluationRoom, RoomSource, room_sources
+from experiments.quick_compilation import compile_quickly
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.job import PACKAGES
 from rein3d_jax.errors import InputError
@@ -42,6 +43,7 @@ from rein3d_jax.io.weights.metric_weights import brisque_weights, i3d_weights, l
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where the input is at fault."""
+    compile_quickly()
     parser = CommandParser("evaluate", __doc__)
     parser.add_recipe(ReconstructConfig, default="quick")
     parser.add_argument("--rooms", metavar="FOLDER", help="of rooms or panoramas, as above, or one room")

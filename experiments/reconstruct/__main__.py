@@ -12,6 +12,7 @@ import sys
 
 from experiments.command import CommandParser
 from experiments.config import load_config, toml_value
+from experiments.quick_compilation import compile_quickly
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.job import run_job
 from rein3d_jax.errors import InputError
@@ -19,6 +20,7 @@ from rein3d_jax.errors import InputError
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0; with one line on stderr 2 where the input or the machine is at fault, or 130 after Ctrl-C."""
+    compile_quickly()
     parser = CommandParser("reconstruct", __doc__)
     parser.lighter = "lower input.height, lift.share or budget.gaussians"
     parser.add_argument("panorama", nargs="?", metavar="PANORAMA", help="the same as --input")
