@@ -8,6 +8,7 @@ this machine is, and how busy, until a job has told by stage.
 import dataclasses
 import hashlib
 import json
+import os
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -30,11 +31,11 @@ _MODEL = 2  # of the numbers below: slowness against other ones says nothing
 COUNTED = ("read", "lift", "explore", "peel", "restore", "refine", "write")
 # Seconds for programs, compiled and kept, of every job; of what only some have: an estimated distance, which leaves an
 # outside to be made up, a network for a finer picture, views to compare with, a restored path and what is fitted to it.
-_COMPILED = dict(zip(COUNTED, (3.0, 13.0, 0.5, 25.0, 5.0, 1.8, 7.5), strict=True))
+_COMPILED = dict(zip(COUNTED, (2.3, 9.5, 0.4, 14.0, 2.4, 0.9, 3.8), strict=True))
 _KEPT = dict(zip(COUNTED, (0.6, 2.2, 0.1, 4.5, 1.0, 0.5, 2.0), strict=True))
-_OF_ESTIMATE = {"read": (22.0, 2.0), "peel": (9.0, 0.5)}
-_OF_FINER, _OF_VIEWS = (12.0, 3.5), (6.0, 0.5)
-_OF_A_PATH = {"restore": (14.0, 0.5), "refine": (20.0, 0.5)}
+_OF_ESTIMATE = {"read": (16.0, 2.0), "peel": (5.0, 0.5)}
+_OF_FINER, _OF_VIEWS = (9.0, 3.5), (3.5, 0.5)
+_OF_A_PATH = {"restore": (7.5, 0.5), "refine": (11.0, 0.5)}
 # Of jobs that restore only what opens enough, those in which some path does. Where the distance is an estimate nothing
 # tells before the run: half a path is foreseen, and neither a path nor none is far off.
 _OPENS = 0.5
@@ -138,12 +139,13 @@ def _gaussians(config: ReconstructConfig, rows: int) -> float:
 
 
 def _keys(config: ReconstructConfig, rows: int, *, upsampled: bool) -> dict[str, str]:
-    """What each stage's programs depend on, hashed: the sizes and settings, not which picture it is."""
+    """What each stage's programs depend on, hashed: compiler, sizes and settings, not which picture it is."""
+    compiler = (jax.__version__, os.environ.get("XLA_FLAGS", ""))
     budget = dataclasses.replace(config.budget, seconds=0.0)
     plain = dataclasses.replace(config, input=InputConfig(), output="", seed=0, budget=budget)
     of_input = dataclasses.replace(config.input, panorama="", distance=config.input.distance and "given", views=None)
-    depends = {stage: (jax.__version__, rows, plain) for stage in COUNTED}
-    depends["read"] = (jax.__version__, rows, upsampled, of_input, config.depth, config.shell)
+    depends = {stage: (compiler, rows, plain) for stage in COUNTED}
+    depends["read"] = (compiler, rows, upsampled, of_input, config.depth, config.shell)
     return {stage: f"{stage} {_hash(on)}" for stage, on in depends.items()}
 
 
