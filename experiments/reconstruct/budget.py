@@ -11,7 +11,7 @@ from rein3d_jax.settings import Settings, setting
 # Of a job's most memory: Python, JAX and XLA's compilers at their busiest, the least of any job; more where the depth
 # network is compiled beside them; the panorama's own maps (its partition's levels, above all); and a lifted Gaussian,
 # through all that renders and writes it.
-_LEAST, _OF_NETWORK, _OF_A_PIXEL, _OF_A_GAUSSIAN = 2_100_000_000, 650_000_000, 160, 480
+_LEAST, _OF_NETWORK, _OF_A_PIXEL, _OF_A_GAUSSIAN = 1_600_000_000, 400_000_000, 300, 480
 
 
 # What a dB of tolerance is in the stages' own limits. Of lift.worth: 0.005, 0.01, 0.025, 0.05 lose 0.06, 0.25, 0.66 and

@@ -18,6 +18,7 @@ _NAMES = ("back", "right", "floor", "front", "left", "ceiling")
 _RIND = 1e-3  # metres inside the shell: nearer, rounding leaves films on the walls that join all that touches them
 _CRUMB = 1e-3  # cubic metres; what is smaller stops nobody
 _DETAIL = 0.02  # metres that do not matter then
+_SPLINTER = 1e-6  # cubic metres of a part; V-HACD leaves some without any, whose fronts face anywhere
 _MAX_PARTS = 16  # of one thing
 _SAMPLES = 50_000  # voxels of one thing
 _EXCESS = 5  # per cent that a part's hull may hold beyond it, lest it is cut again
@@ -56,4 +57,11 @@ def _taken_apart(solid: Any) -> list[tuple[np.ndarray, np.ndarray]]:
     vertices, faces = mesh_of_solid(solid.simplify(_DETAIL))
     counted = np.insert(faces, 0, 3, axis=1).astype(np.uint32).ravel()  # each face after its number of corners
     sizes = {"maxConvexHulls": _MAX_PARTS, "resolution": _SAMPLES, "maxNumVerticesPerCH": _MAX_CORNERS}
-    return vhacdx.compute_vhacd(vertices, counted, asyncACD=False, minimumVolumePercentErrorAllowed=_EXCESS, **sizes)
+    hulls = vhacdx.compute_vhacd(vertices, counted, asyncACD=False, minimumVolumePercentErrorAllowed=_EXCESS, **sizes)
+    return [hull for hull in hulls if _volume(*hull) > _SPLINTER]
+
+
+def _volume(vertices: np.ndarray, faces: np.ndarray) -> float:
+    """Of a closed mesh, fronts outwards: the sum over its faces' tetrahedra from the first corner."""
+    a, b, c = np.moveaxis((vertices - vertices[0])[faces], 1, 0)
+    return float(np.sum(a * np.cross(b, c)) / 6)
