@@ -11,7 +11,7 @@ from rein3d_jax.errors import InputError
 from rein3d_jax.geometry.shell import world_from_shell
 from rein3d_jax.meshes.collider import Collider
 from rein3d_jax.meshes.free_space import shell_corners
-from rein3d_jax.meshes.solid import box_solid, closed_solid, mesh_of_solid
+from rein3d_jax.meshes.solid import box_solid, closed_solid, manifold_library, mesh_of_solid
 
 _WALL = 0.2  # metres, a slab's thickness
 _NAMES = ("back", "right", "floor", "front", "left", "ceiling")
@@ -58,10 +58,5 @@ def _taken_apart(solid: Any) -> list[tuple[np.ndarray, np.ndarray]]:
     counted = np.insert(faces, 0, 3, axis=1).astype(np.uint32).ravel()  # each face after its number of corners
     sizes = {"maxConvexHulls": _MAX_PARTS, "resolution": _SAMPLES, "maxNumVerticesPerCH": _MAX_CORNERS}
     hulls = vhacdx.compute_vhacd(vertices, counted, asyncACD=False, minimumVolumePercentErrorAllowed=_EXCESS, **sizes)
-    return [hull for hull in hulls if _volume(*hull) > _SPLINTER]
-
-
-def _volume(vertices: np.ndarray, faces: np.ndarray) -> float:
-    """Of a closed mesh, fronts outwards: the sum over its faces' tetrahedra from the first corner."""
-    a, b, c = np.moveaxis((vertices - vertices[0])[faces], 1, 0)
-    return float(np.sum(a * np.cross(b, c)) / 6)
+    hull_of = manifold_library().Manifold.hull_points
+    return [(corners, faces) for corners, faces in hulls if hull_of(corners).volume() > _SPLINTER]

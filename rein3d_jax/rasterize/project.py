@@ -77,10 +77,8 @@ def _pixel_frame(direction, pitch):
     x, _, z = jnp.moveaxis(direction, -1, 0)
     cos_latitude = safe_norm(jnp.stack([x, z], axis=-1))
     at_pole = cos_latitude < 1e-6
-    safe = jnp.where(at_pole, 1.0, cos_latitude)
-    along = jnp.stack(
-        [jnp.where(at_pole, 1.0, z / safe), jnp.zeros_like(x), jnp.where(at_pole, 0.0, -x / safe)], axis=-1
-    )
+    x, z, norm = jnp.where(at_pole, 0.0, x), jnp.where(at_pole, 1.0, z), jnp.where(at_pole, 1.0, cos_latitude)
+    along = jnp.stack([z / norm, jnp.zeros_like(x), -x / norm], axis=-1)
     return jnp.stack([along, jnp.cross(along, direction)], axis=-2), jnp.maximum(cos_latitude, 1 - cos_latitude / pitch)
 
 
@@ -109,13 +107,14 @@ def _equirectangular(points, spread, distance, camera, config):
     in_range = (distance > config.near) & (distance < config.far)
     safe_distance = jnp.where(in_range, distance, 1.0)
     direction = jnp.where(in_range[:, None], points, jnp.array([0.0, 0.0, 1.0])) / safe_distance[:, None]
-    frame, width = _pixel_frame(direction, jnp.pi / camera.height)
+    pitch = jnp.pi / camera.height
+    frame, width = _pixel_frame(direction, pitch)
     rows = jnp.einsum("nij,njk->nik", frame, spread, precision="highest") / safe_distance[:, None, None]
     radial = jnp.einsum("ni,nij->nj", direction, spread, precision="highest") / safe_distance[:, None]
     rows = _curved(rows, radial)
     # A pixel is as wide as its column is there: in units of it the filter is round.
     rows = jnp.stack([rows[:, 0] / width[:, None], rows[:, 1]], axis=1)
-    (xx, xy, yy, det), factor = filtered(rows, config.filter_variance * (jnp.pi / camera.height) ** 2, config=config)
+    (xx, xy, yy, det), factor = filtered(rows, config.filter_variance * pitch**2, config=config)
     xx, xy, det = xx * width**2, xy * width, det * width**2
     axes = jnp.einsum("nij,njk->nik", _whitening(xx, xy, yy, det), frame, precision="highest")
     sigma = jnp.sqrt((xx + yy) / 2 + jnp.sqrt(((xx - yy) / 2) ** 2 + xy**2 + 1e-30))

@@ -41,8 +41,8 @@ def render_viewer(
     """HTML of the whole page. `scenes`: name -> the bytes of an SPZ file, the last one shown first; or all of them
     paths on the server that the page comes from, fetched when they are shown. `panorama`: a JPEG or PNG file.
     `floor_map`: walls, paths, and the safe area, which the visitor does not leave. `backdrop`: the sRGB colour of what
-    no splat covers. `pixel_filter`: the rasterizer's kind of filter, and its variance in
-    pixels^2. Raises ValueError for a scene or picture of another format."""
+    no splat covers. `pixel_filter`: the rasterizer's kind of filter, its variance in pixels^2. Raises ValueError for a
+    scene or picture of another format."""
     served = all(isinstance(data, str) for data in scenes.values())
     if not scenes or not (served or all(_is_spz(data) for data in scenes.values())):
         raise ValueError("a viewer's scenes are one SPZ file or more, or all of them paths on its server")

@@ -59,17 +59,17 @@ def test_it_widens_splats_as_the_rasterizer_does(chromium, until, room, tmp_path
     scene = room[0].replace(alive=jnp.arange(room[0].alive.size) % 101 == 0, sh=0 * room[0].sh + 1.5)
     page = chromium.new_context(viewport={"width": SIZE, "height": SIZE}).new_page()
     camera, found = pinhole_camera(upright(jnp.zeros(3), 0.3, 0.1), SIZE, np.radians(FOV)), {}
+    plan, ours = FloorMap(4 * SAFE, SAFE, (SAFE[:2],), np.zeros((0, 2))), {}
     for kind in (LEAST, ADDED):
-        plan = FloorMap(4 * SAFE, SAFE, (SAFE[:2],), np.zeros((0, 2)))
-        (tmp_path / kind).with_suffix(".html").write_text(
-            render_viewer({"scene": encode_spz(scene)}, None, plan, pixel_filter=(kind, VARIANCE)), encoding="utf-8"
-        )
-        page.goto((tmp_path / kind).with_suffix(".html").as_uri(), wait_until="commit")
+        frame, _ = render(scene, camera, config=RasterizeConfig(filter=kind, filter_variance=VARIANCE))
+        ours[kind] = frame.rgb + 0.5 * (1 - frame.alpha[..., None])  # the page's backdrop
+    for kind in (LEAST, ADDED):
+        file, spz = tmp_path / f"{kind}.html", encode_spz(scene)
+        file.write_text(render_viewer({"scene": spz}, None, plan, pixel_filter=(kind, VARIANCE)), encoding="utf-8")
+        page.goto(file.as_uri(), wait_until="commit")
         until(page, "!!globalThis.viewer && viewer.settled()")
         shown = seen(page, until, 0, yaw=0.3, pitch=0.1)
-        for ours in (LEAST, ADDED):
-            frame, _ = render(scene, camera, config=RasterizeConfig(filter=ours, filter_variance=VARIANCE))
-            found[kind, ours] = psnr(shown, frame.rgb + 0.5 * (1 - frame.alpha[..., None]))
+        found |= {(kind, other): psnr(shown, picture) for other, picture in ours.items()}
     print({pair: f"{value:.1f} dB" for pair, value in found.items()})
     for kind, other in ((LEAST, ADDED), (ADDED, LEAST)):
         assert found[kind, kind] > found[kind, other] + 10  # dB; SPZ's steps are in both

@@ -30,5 +30,5 @@ def viewer_page(run: Run) -> str:
             last = encode_spz(lighter_scene(scene, count), "the scene")
         scenes = {name: last}
     plan, raster = room_plan(result.trajectories, config.explore, run.views), config.rasterize
-    shown = {"backdrop": np.asarray(run.backdrop), "pixel_filter": (raster.filter, raster.filter_variance)}
-    return render_viewer(scenes, panorama, plan, **shown)
+    seen_by = (raster.filter, raster.filter_variance)
+    return render_viewer(scenes, panorama, plan, backdrop=np.asarray(run.backdrop), pixel_filter=seen_by)
