@@ -36,7 +36,7 @@ class StudiedRoom:
         pictures, errors = [], []
         for view in self.views:
             frame, self.buffers = render(scene, view.camera, config=RasterizeConfig(), buffers=self.buffers)
-            pictures.append(jnp.clip(frame.rgb + (1 - frame.alpha)[..., None] * self.room.backdrop, 0, 1))
+            pictures.append(frame.over(self.room.backdrop))
             errors.append(np.mean((np.asarray(pictures[-1]) - np.asarray(view.rgb)) ** 2, axis=-1))
         shown, error = np.stack([np.asarray(view.region) for view in self.views]), np.stack(errors)
         found = {"psnr": float(np.mean([decibels(squared) for squared in errors]))}

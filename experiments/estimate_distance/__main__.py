@@ -11,7 +11,6 @@ would take it.
 
 import argparse
 import json
-import sys
 import time
 from pathlib import Path
 
@@ -20,7 +19,7 @@ import numpy as np
 
 from experiments.command import CommandParser
 from experiments.config import load_config, toml_value
-from experiments.quick_compilation import compile_quickly
+from experiments.quick_process import begin_quickly, end_quickly
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.inputs import resolve, told_panorama
 from rein3d_jax.depth.level import LEANED, levelled
@@ -39,7 +38,7 @@ from rein3d_jax.upsample import distance_for
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where the input is at fault."""
-    compile_quickly()
+    begin_quickly()
     parser = CommandParser("estimate_distance", __doc__)
     parser.add_argument("--input", metavar="FILE", required=True, help="an equirectangular JPEG, PNG, EXR or HDR (2:1)")
     parser.add_argument("--output", metavar="FILE", required=True, help="the distance to write, ending in .exr")
@@ -93,4 +92,4 @@ def _line(facts: dict) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    end_quickly(main())

@@ -17,7 +17,6 @@ import importlib.metadata
 import json
 import os
 import platform
-import sys
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -32,7 +31,7 @@ from experiments.evaluate.methods import REFINED, chosen_methods, recipe_of
 from experiments.evaluate.protocols import NO_TRUTH, PROTOCOLS, Tools
 from experiments.evaluate.results import line, stored_outcome, table
 from experiments.evaluate.room import EvaluationRoom, RoomSource, room_sources
-from experiments.quick_compilation import compile_quickly
+from experiments.quick_process import begin_quickly, end_quickly
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.job import PACKAGES
 from rein3d_jax.errors import InputError
@@ -43,7 +42,7 @@ from rein3d_jax.io.weights.metric_weights import brisque_weights, i3d_weights, l
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where the input is at fault."""
-    compile_quickly()
+    begin_quickly()
     parser = CommandParser("evaluate", __doc__)
     parser.add_recipe(ReconstructConfig, default="quick")
     parser.add_argument("--rooms", metavar="FOLDER", help="of rooms or panoramas, as above, or one room")
@@ -185,4 +184,4 @@ _NOTES = {
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    end_quickly(main())

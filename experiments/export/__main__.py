@@ -11,7 +11,6 @@ sees along a walk.
 
 import argparse
 import re
-import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -26,7 +25,7 @@ from experiments.export.scene_files import SCENES, write_gltf, write_mesh, write
 from experiments.export.scene_mesh import MeshConfig
 from experiments.export.scene_panoramas import write_panoramas
 from experiments.export.walk import SafeArea, random_walk, read_walk
-from experiments.quick_compilation import compile_quickly
+from experiments.quick_process import begin_quickly, end_quickly
 from experiments.run_folder import RunFolder, open_run
 from rein3d_jax.io.exports.colmap import write_colmap
 from rein3d_jax.io.exports.nerfstudio import write_nerfstudio
@@ -42,7 +41,7 @@ _MOST_FRAMES, _LARGEST_SIDE = 100_000, 8192
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0, or 2 with one line on stderr where the input is at fault."""
-    compile_quickly()
+    begin_quickly()
     parser = CommandParser("export", __doc__)
     parser.add_argument("run", metavar="RUN_FOLDER", help="what reconstruct wrote, with its stages folder")
     parser.add_argument("--to", nargs="+", required=True, choices=list(_KINDS), metavar="KIND",
@@ -126,4 +125,4 @@ _KINDS: dict[str, Callable[[RunFolder, Path, argparse.Namespace], str]] = {
 }
 
 if __name__ == "__main__":
-    sys.exit(main())
+    end_quickly(main())

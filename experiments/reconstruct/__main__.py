@@ -8,11 +8,10 @@ each finished stage into its `stages` folder, from which --resume goes on.
 """
 
 import argparse
-import sys
 
 from experiments.command import CommandParser
 from experiments.config import load_config, toml_value
-from experiments.quick_compilation import compile_quickly
+from experiments.quick_process import begin_quickly, end_quickly
 from experiments.reconstruct.config import ReconstructConfig
 from experiments.reconstruct.job import run_job
 from rein3d_jax.errors import InputError
@@ -20,7 +19,7 @@ from rein3d_jax.errors import InputError
 
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0; with one line on stderr 2 where the input or the machine is at fault, or 130 after Ctrl-C."""
-    compile_quickly()
+    begin_quickly()
     parser = CommandParser("reconstruct", __doc__)
     parser.lighter = "lower input.height, lift.share or budget.gaussians"
     parser.add_argument("panorama", nargs="?", metavar="PANORAMA", help="the same as --input")
@@ -51,4 +50,4 @@ def _overrides(options: argparse.Namespace) -> list[str]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    end_quickly(main())

@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Iterator
 
-import jax.numpy as jnp
 import numpy as np
 
 from rein3d_jax.explore.trajectories import Trajectories
@@ -42,7 +41,7 @@ def flythrough(
     def picture(camera):
         nonlocal buffers
         frame, buffers = render(gaussians, camera, config=config, buffers=buffers)
-        return np.asarray(jnp.clip(frame.rgb + (1 - frame.alpha[..., None]) * backdrop, 0, 1))
+        return np.asarray(frame.over(backdrop))
 
     for index, (azimuth, length) in enumerate(zip(azimuths, lengths, strict=True)):
         heading = np.array([np.cos(azimuth), -np.sin(azimuth), 0.0])

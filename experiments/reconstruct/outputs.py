@@ -64,7 +64,7 @@ def write_outputs(run: Run, store: StageStore, started: float, foreseen: dict) -
 
 def _ends(trajectories: Trajectories) -> jax.Array:
     """(k, 4, 4) poses at the ends of the longest trajectories."""
-    return path_ends(trajectories)[jnp.array(longest(trajectories))]
+    return path_ends(trajectories)[np.array(longest(trajectories))]
 
 
 def _alike(*scenes: Gaussians) -> list[Gaussians]:

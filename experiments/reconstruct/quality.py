@@ -27,7 +27,7 @@ def render_views(scenes: Sequence[Gaussians], views: list[View], backdrop: jax.A
         found.append([])
         for view in views:
             frame, buffers = render(scene, view.camera, config=config, buffers=buffers)
-            found[-1].append(np.asarray(jnp.clip(frame.rgb + (1 - frame.alpha[..., None]) * backdrop, 0, 1)))
+            found[-1].append(np.asarray(frame.over(backdrop)))
     return found
 
 

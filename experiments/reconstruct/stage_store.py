@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import jax.numpy as jnp
+import jax
 import numpy as np
 
 from experiments.compile_clock import program_seconds
@@ -28,14 +28,14 @@ UNFINISHED = "unfinished"  # what the stage being made has so far
 def blank_stages(refine: RefineConfig) -> dict[str, Any]:
     """Each stage's result, as a pytree of its structure and dtypes with which to read one back, by its file's name."""
     scene, snapshot = _blank(Gaussians, alive=bool), blank_snapshot(refine)
-    video, number = _blank(Video), jnp.zeros(0, jnp.int32)
+    video, number, share = _blank(Video), _leaf(np.int32), _leaf(np.float32)
     return {
         # whether its distance was estimated, what was done to a given one, how it leaned
         "read": (_blank(Panorama, valid=bool), np.zeros(0, bool), "", _blank(Lean)),
         "lift": scene,
         "peel": scene,
-        "explore": _blank(Trajectories, counts=jnp.int32, overflow=jnp.int32),
-        "restore": Explored(scene, video, number, jnp.zeros(0), number, number),
+        "explore": _blank(Trajectories, counts=np.int32, overflow=np.int32),
+        "restore": Explored(scene, video, number, share, number, number),
         "refine": (scene, snapshot.curves, ""),  # and why it ended
         UNFINISHED: snapshot,
     }
@@ -43,7 +43,11 @@ def blank_stages(refine: RefineConfig) -> dict[str, Any]:
 
 def _blank(struct_type, **dtypes):
     names = [field.name for field in dataclasses.fields(struct_type)]
-    return struct_type(**{name: jnp.zeros(0, dtypes.get(name, jnp.float32)) for name in names})
+    return struct_type(**{name: _leaf(dtypes.get(name, np.float32)) for name in names})
+
+
+def _leaf(dtype) -> jax.ShapeDtypeStruct:
+    return jax.ShapeDtypeStruct((0,), dtype)
 
 
 @dataclasses.dataclass(frozen=True)

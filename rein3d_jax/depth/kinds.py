@@ -11,7 +11,7 @@ relative   distance along each ray, up to a factor
 
 import numpy as np
 
-from rein3d_jax.geometry.sphere import pixel_rays
+from rein3d_jax.geometry.sphere import pixel_rays64
 from rein3d_jax.scene import Panorama
 
 DISTANCE_KINDS = ("distance", "z", "disparity", "relative")
@@ -22,7 +22,7 @@ def along_ray(panorama: Panorama, kind: str) -> Panorama:
     """The panorama (h, 2 h) with distances along the ray, of one whose `distance` holds numbers of a `kind`: in
     metres if that is one of METRIC_KINDS, else up to a factor."""
     if kind == "z":
-        axis = np.max(np.abs(pixel_rays(*panorama.distance.shape)), axis=-1)
+        axis = np.max(np.abs(pixel_rays64(len(panorama.distance))), axis=-1)
         return panorama.replace(distance=panorama.distance / axis)
     if kind == "disparity":
         known = np.where(panorama.valid, panorama.distance, 1)

@@ -81,7 +81,7 @@ class Lean:
         """The rotation (3, 3) that `levelled` applies to directions: the least one that brings `up` to +Z, so that the
         heading stays; the identity where the picture is left alone."""
         if self.verdict != LEANED:
-            return jnp.eye(3)
+            return jax.device_put(np.eye(3, dtype=np.float32))
         x, y, z = self.up  # quaternion (1 + cos, up x Z) of twice its half angle
         return matrix_from_quats(jnp.stack([1 + z, y, -x, jnp.zeros_like(x)]))
 

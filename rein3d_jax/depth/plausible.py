@@ -10,7 +10,7 @@ from rein3d_jax.conventions import EYE_HEIGHT
 from rein3d_jax.depth.kinds import along_ray
 from rein3d_jax.depth.scale import height_above_floor
 from rein3d_jax.errors import InputError
-from rein3d_jax.geometry.sphere import pixel_rays
+from rein3d_jax.geometry.sphere import pixel_rays64
 from rein3d_jax.scene import Panorama
 
 _NEAREST, _FARTHEST = 0.5, 30.0  # metres, of the median of a room
@@ -60,7 +60,7 @@ def _deviations(panorama: Panorama) -> np.ndarray:
     """Relative deviation (n,) of each patch's inverse distance from a plane's; inf where something is unknown."""
     stride = max(len(panorama.distance) // _ROWS, 1)
     grid = np.s_[stride // 2 :: stride, stride // 2 :: stride]
-    rays = _patches(np.asarray(pixel_rays(*panorama.distance.shape), np.float64)[grid])
+    rays = _patches(pixel_rays64(len(panorama.distance))[grid])
     valid = _patches(np.asarray(panorama.valid)[grid][..., None])[..., 0].all(axis=1)
     distance = _patches(np.asarray(panorama.distance, np.float64)[grid][..., None])[..., 0]
     inverse = 1 / np.where(valid[:, None], distance, 1)

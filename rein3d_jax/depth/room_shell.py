@@ -15,7 +15,6 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
-import jaxopt
 
 from rein3d_jax.conventions import EYE_HEIGHT
 from rein3d_jax.depth.shell_evidence import (
@@ -159,6 +158,7 @@ _loss_and_slope = jax.jit(jax.value_and_grad(_loss, has_aux=True), static_argnam
 def _refine(box: jax.Array, evidence: Evidence, config: RoomShellConfig) -> tuple[jax.Array, float, float]:
     """The nearest local optimum, its loss and support, by L-BFGS-B: SciPy's through jaxopt, since jaxopt's own
     LBFGS takes 15 CPU seconds to compile here and this one 4."""
+    import jaxopt  # not before: SciPy's optimizers take 0.4 s to import, and most jobs fit no box
 
     def fun(box):
         (loss, _), slope = _loss_and_slope(box, evidence, config)

@@ -30,6 +30,7 @@ class Trajectories:
     safe: jax.Array  # (w,) metres, D_safe by column
 
 
+@jax.jit
 def path_ends(paths: Trajectories) -> jax.Array:
     """world_from_camera (tau, 4, 4) of each path's last frame."""
     return paths.world_from_camera[jnp.arange(len(paths.counts)), paths.counts - 1]

@@ -6,6 +6,8 @@ block's near cells lose weight against its far ones, and a cell that is nearer t
 not accepted.
 """
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 
@@ -18,6 +20,7 @@ _NEARER = 12.0  # how sharply a cell loses trust per e-fold that it is nearer th
 _TOLERANCE, _TOLERANCE_PER_PIXEL = 0.1, 0.02
 
 
+@partial(jax.jit, static_argnames="prefer_far")  # several programs fill pictures of one size: it is traced once
 def push_pull(
     image: jax.Array, weight: jax.Array, *, otherwise: jax.Array | None = None, prefer_far: bool = False
 ) -> jax.Array:

@@ -61,14 +61,18 @@ def rays_of_pose(world_from_camera: jax.Array, height: int, width: int) -> jax.A
     return jnp.matmul(pixel_rays(height, width), rotation.T, precision=jax.lax.Precision.HIGHEST)
 
 
-def rays_of_pose64(world_from_camera: np.ndarray, height: int) -> np.ndarray:
-    """The rays (height, 2 height, 3) of `rays_of_pose` in NumPy's float64, as exact distances need them."""
+def pixel_rays64(height: int) -> np.ndarray:
+    """`pixel_rays` (height, 2 height, 3) in NumPy's float64."""
     azimuth = ((np.arange(2 * height) + 0.5) / (2 * height) - 0.5) * 2 * np.pi
     latitude = ((0.5 - (np.arange(height) + 0.5) / height) * np.pi)[:, None]
     flat = np.cos(latitude)
     up = np.broadcast_to(np.sin(latitude), (height, 2 * height))
-    rays = np.stack([flat * np.cos(azimuth), -flat * np.sin(azimuth), up], axis=-1)
-    return rays @ (np.asarray(world_from_camera, np.float64)[:3, :3] @ WORLD_FROM_CAMERA_AXES.T).T
+    return np.stack([flat * np.cos(azimuth), -flat * np.sin(azimuth), up], axis=-1)
+
+
+def rays_of_pose64(world_from_camera: np.ndarray, height: int) -> np.ndarray:
+    """The rays (height, 2 height, 3) of `rays_of_pose` in NumPy's float64, as exact distances need them."""
+    return pixel_rays64(height) @ (np.asarray(world_from_camera, np.float64)[:3, :3] @ WORLD_FROM_CAMERA_AXES.T).T
 
 
 def pixel_solid_angles(height: int, width: int) -> jax.Array:

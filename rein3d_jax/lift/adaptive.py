@@ -49,18 +49,11 @@ def lift_adaptively(
     if config.share >= 1:
         return lift(panorama, world_from_camera, select, config=config)
     capacity = capacity_of(*panorama.distance.shape, config)
-    distance, known = _prepared(panorama, config)
+    distance, known = with_steps(panorama, config)
     config = dataclasses.replace(config, snap_edges=False)  # the rest is one program, whether edges were snapped or not
     wanted = known & select
     leaves = partition(leaf_costs(panorama.rgb, distance, wanted, config=config), wanted, capacity, config.worth)
     return _gaussians_of(leaves, panorama.rgb, distance, known, world_from_camera, config)
-
-
-@partial(jax.jit, static_argnums=1)
-def _prepared(panorama: Panorama, config: LiftConfig) -> tuple[jax.Array, jax.Array]:
-    """Distances with steps where they were blurred, 1 where unknown; and where they are known."""
-    known = panorama.valid & (panorama.distance > 0)
-    return with_steps(jnp.where(known, panorama.distance, 1.0), known, config), known
 
 
 @partial(jax.jit, static_argnums=5)

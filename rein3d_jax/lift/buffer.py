@@ -19,7 +19,7 @@ def with_capacity(gaussians: Gaussians, capacity: int) -> Gaussians:
     grow = capacity - count
     padded = jax.tree.map(lambda x: np.pad(x, [(0, grow)] + [(0, 0)] * (x.ndim - 1)), gaussians)
     padded.quats[count:, 0] = 1.0
-    return jax.tree.map(jnp.asarray, padded)
+    return jax.device_put(padded)
 
 
 def _merge(scene: Gaussians, new: Gaussians) -> tuple[Gaussians, jax.Array]:

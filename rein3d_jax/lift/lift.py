@@ -7,6 +7,9 @@ blur half of a photo's detail away, so ours overlap and are coloured as `appeara
 distance; nothing here is in absolute metres.
 """
 
+import dataclasses
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 
@@ -16,7 +19,7 @@ from rein3d_jax.lift.patches import Patches, gaussians_of, pixel_traits, with_st
 from rein3d_jax.scene import Gaussians, Panorama
 
 
-def _lift(
+def lift(
     panorama: Panorama, world_from_camera: jax.Array, select: jax.Array, *, config: LiftConfig = LiftConfig()
 ) -> Gaussians:
     """Gaussians of capacity h * w, row by row, spherical harmonics of degree 0.
@@ -28,13 +31,16 @@ def _lift(
     height, width = panorama.distance.shape
     assert panorama.rgb.shape == (height, width, 3), panorama.rgb.shape
     assert select.shape == panorama.valid.shape == (height, width), (select.shape, panorama.valid.shape)
-    known = panorama.valid & (panorama.distance > 0)
-    distance = with_steps(jnp.where(known, panorama.distance, 1.0), known, config)
-    traits = pixel_traits(panorama.rgb, distance, known, config)
+    distance, known = with_steps(panorama, config)
+    config = dataclasses.replace(config, snap_edges=False)  # the rest is one program, whether edges were snapped or not
+    return _lift(panorama.rgb, distance, known, select, world_from_camera, config)
+
+
+@partial(jax.jit, static_argnums=5)
+def _lift(rgb, distance, known, select, world_from_camera, config: LiftConfig) -> Gaussians:
+    height, width = distance.shape
+    traits = pixel_traits(rgb, distance, known, config)
     middle = pixel_rays(height, width) * distance[..., None]
     patches = Patches(middle, jnp.ones((height, width, 2)), traits, select & known)
     flat = jax.tree.map(lambda x: x.reshape(height * width, *x.shape[2:]), patches)
     return gaussians_of(flat, world_from_camera, pitch=jnp.pi / height, config=config)
-
-
-lift = jax.jit(_lift, static_argnames=("config",))

@@ -1,6 +1,7 @@
 """Patches of a surface that a panorama saw, and the Gaussians that show them."""
 
 import math
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -15,7 +16,7 @@ from rein3d_jax.lift.config import LiftConfig
 from rein3d_jax.lift.edges import snap_edges
 from rein3d_jax.lift.splat_shape import splat_shape
 from rein3d_jax.lift.surface import slopes
-from rein3d_jax.scene import Gaussians
+from rein3d_jax.scene import Gaussians, Panorama
 
 
 @struct.dataclass
@@ -37,11 +38,16 @@ class Patches:
     alive: jax.Array  # (...) bool
 
 
-def with_steps(distance: jax.Array, known: jax.Array, config: LiftConfig) -> jax.Array:
-    """The distance (h, w) with its blurred edges made steps, if the config says so."""
-    if not config.snap_edges:
-        return distance
-    return snap_edges(distance, known, ramp=config.edge_ramp, step=config.edge_step, slope=config.edge_slope)
+@partial(jax.jit, static_argnums=1)
+def with_steps(panorama: Panorama, config: LiftConfig) -> tuple[jax.Array, jax.Array]:
+    """The distance (h, w), 1 where it is unknown, its blurred edges made steps if the config says so; and where it is
+    known."""
+    known = panorama.valid & (panorama.distance > 0)
+    distance = jnp.where(known, panorama.distance, 1.0)
+    if config.snap_edges:
+        chosen = {"ramp": config.edge_ramp, "step": config.edge_step, "slope": config.edge_slope}
+        distance = snap_edges(distance, known, **chosen)
+    return distance, known
 
 
 def pixel_traits(rgb: jax.Array, distance: jax.Array, known: jax.Array, config: LiftConfig) -> Traits:

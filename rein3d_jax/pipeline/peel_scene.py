@@ -34,7 +34,7 @@ def peel_scene(
             layer, hidden = behind_things(taken, restore(taken, key), background.shell)
             new = lift_adaptively(layer, origin_pose(), hidden, config=config)
             scene, _ = joined_in(scene, new, grow=True)
-    if stages.peel.outside:
+    if stages.peel.outside and not known.panorama.valid.all():  # windows have no distance
         outside = outside_of(known.panorama, known.trajectories.positions.reshape(-1, 3))
         if outside.there:
             new = lift(outside.panorama, origin_pose(), outside.shown, config=config)

@@ -1,10 +1,12 @@
 """The scene with its guesses, refined: the views it is fitted to, how large it may be, what stays as it is."""
 
 import dataclasses
+import math
 from collections.abc import Iterator, Sequence
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from rein3d_jax.explore.hidden import in_doubt, on_observed
 from rein3d_jax.lift import compact
@@ -21,8 +23,11 @@ STILL_OF_A_PIXEL = 4  # Gaussians of what stays as it is, for each pixel of six 
 _GOLDEN_ANGLE = 2.399963  # radians: successive multiples spread the cuts between a trajectory's views evenly
 
 
-def collect_views(panorama: Panorama, videos: Sequence[Video], *, stages: Stages) -> Views:
-    """Views of the input panorama and of every restored frame but the origin's, weighed by trust."""
+def collect_views(panorama: Panorama, videos: Sequence[Video], *, stages: Stages) -> Views | None:
+    """Views of the input panorama and of every restored frame but the origin's, weighed by trust; None where no step is
+    to be taken, which would look at them."""
+    if stages.refine.steps == 0:
+        return None
     config, trust = stages.refine.views, stages.refine.loss
     seen = (panorama.rgb, trust.observed * jnp.ones(panorama.distance.shape), origin_pose())
     parts = [views_from_panorama(*seen, yaw=yaw, config=config) for yaw in (0.0, jnp.pi / 4)]
@@ -45,11 +50,12 @@ def where_it_pays(stages: Stages, videos: Sequence[Video]) -> Stages:
 
 def scene_extent(panorama: Panorama) -> float:
     """Metres: the median known distance, the length that rates and sizes are measured in."""
-    return float(jnp.nanmedian(jnp.where(panorama.valid, panorama.distance, jnp.nan)))
+    known = np.asarray(panorama.distance)[np.asarray(panorama.valid)]
+    return float(np.median(known)) if known.size else math.nan
 
 
 def refine_scene(
-    start: Gaussians | Snapshot, views: Views, panorama: Panorama, key: jax.Array, *, stages: Stages
+    start: Gaussians | Snapshot, views: Views | None, panorama: Panorama, key: jax.Array, *, stages: Stages
 ) -> Iterator[Snapshot]:
     """`refine`'s snapshots (paper Sec. 3.3) of the scene `start`, brought within its limits, or on from a snapshot."""
     config, raster = stages.refine, stages.rasterize
@@ -68,7 +74,7 @@ def _parts(scene: Gaussians, panorama: Panorama, stages: Stages) -> tuple[Gaussi
     if limit:
         scene = lighter_scene(scene, limit)
     living = int(scene.alive.sum())
-    if config.freeze_observed:
+    if config.freeze_observed and config.steps:
         sure = scene.alive & on_observed(panorama, scene.means) & ~in_doubt(panorama, scene.means)
         kept = int(sure.sum())
         still = compact(scene.replace(alive=sure), capacity=bucket(kept))

@@ -35,6 +35,7 @@ class Stages(Settings):
     refine: RefineConfig = RefineConfig()
 
 
+@jax.jit
 def level_pose(position: jax.Array) -> jax.Array:
     """world_from_camera (..., 4, 4) of a panorama at (..., 3) metres that is oriented as the input is: along +X."""
     return rigid(jnp.broadcast_to(world_from_camera_axes(), (*position.shape[:-1], 3, 3)), position)
@@ -53,6 +54,12 @@ def render_video(
     for pose in poses:
         camera = equirectangular_camera(pose, height)
         frame, buffers = render(gaussians, camera, config=config, buffers=buffers)
-        frames.append((frame.rgb / jnp.maximum(frame.alpha, 1e-6)[..., None], frame.alpha, frame.distance))
+        frames.append((_straight(frame.rgb, frame.alpha), frame.alpha, frame.distance))
     rgb, alpha, distance = (jnp.stack(part) for part in zip(*frames, strict=True))
-    return Video(jnp.clip(rgb, 0, 1), alpha, distance, poses), buffers
+    return Video(rgb, alpha, distance, poses), buffers
+
+
+@jax.jit
+def _straight(rgb: jax.Array, alpha: jax.Array) -> jax.Array:
+    """Colours (h, w, 3) in [0, 1], no longer premultiplied."""
+    return jnp.clip(rgb / jnp.maximum(alpha, 1e-6)[..., None], 0, 1)

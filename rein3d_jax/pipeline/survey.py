@@ -44,7 +44,8 @@ def with_distance(
             raise InputError(f'depth.method "network" needs the trained network: {mend}')
         found = estimate_distance(panorama.rgb, network, camera_height, shell=stages.shell)
         panorama = Panorama(panorama.rgb, found.distance, found.known, found.doubt)
-    distance = complete_distance(panorama, config=stages.depth)
+    whole = bool(panorama.valid.all())
+    distance = panorama.distance if whole else complete_distance(panorama, config=stages.depth)
     doubt = jnp.zeros(distance.shape) if panorama.doubt is None else panorama.doubt
     return panorama.replace(distance=distance, doubt=doubt), estimated
 

@@ -46,6 +46,15 @@ class Frame:
     needed: jax.Array  # (4,) buffer sizes this view called for, in the order of `Buffers`
     overflow: jax.Array  # () entries dropped; 0 or the picture is not the scene's
 
+    def over(self, backdrop: jax.Array) -> jax.Array:
+        """The picture (h, w, 3) in [0, 1] over the colour `backdrop` (3,)."""
+        return _over(self.rgb, self.alpha, backdrop)
+
+
+@jax.jit
+def _over(rgb: jax.Array, alpha: jax.Array, backdrop: jax.Array) -> jax.Array:
+    return jnp.clip(rgb + (1 - alpha[..., None]) * backdrop, 0, 1)
+
 
 def _rasterize(
     gaussians: Gaussians,

@@ -20,6 +20,7 @@ def split_parameters(gaussians: Gaussians) -> dict[str, jax.Array]:
     }
 
 
+@jax.jit
 def join_parameters(parameters: dict[str, jax.Array], alive: jax.Array) -> Gaussians:
     """Inverse of `split_parameters`."""
     names = ("means", "log_scales", "quats", "opacity_logits")

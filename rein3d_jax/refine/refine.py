@@ -33,7 +33,7 @@ class _Schedule:
 
 def refine(
     snapshot: Snapshot,
-    views: Views,
+    views: Views | None,
     key: jax.Array,
     *,
     config: RefineConfig,

@@ -1,7 +1,6 @@
 """The refinement between two steps: enough to go on to the same bytes, and what has been seen on the way."""
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
@@ -53,28 +52,28 @@ class Snapshot:
 
 def first_snapshot(
     gaussians: Gaussians,
-    views: Views,
+    views: Views | None,
     *,
     extent: float,
     config: RefineConfig,
     raster: RasterizeConfig,
     still: Still | None = None,
 ) -> Snapshot:
-    """The refinement of `gaussians` before its first step. `extent` is the scene's size in metres; `still` is what
-    stays as it is, or None."""
+    """The refinement of `gaussians` before its first step; without steps no `views` are looked at. `extent` is the
+    scene's size in metres; `still` is what stays as it is, or None."""
     state = initial_state(gaussians, config, extent=extent, still=still)
-    chosen = np.unique(np.linspace(0, views.rgb.shape[0] - 1, _ALLOCATED_BY).astype(int))
-    cameras = [camera_of(views, int(i)) for i in chosen]
-    # Without steps nothing is rendered.
-    scene = state.shown(state.parameters)
-    buffers = allocate(scene, cameras, config=raster, slack=1.25) if config.steps else jnp.zeros(4, jnp.int32)
+    buffers = np.zeros(4, np.int32)
+    if config.steps:  # without them nothing is rendered
+        chosen = np.unique(np.linspace(0, views.rgb.shape[0] - 1, _ALLOCATED_BY).astype(int))
+        cameras = [camera_of(views, int(i)) for i in chosen]
+        buffers = np.array(allocate(state.shown(state.parameters), cameras, config=raster, slack=1.25), np.int32)
     rows, total = np.zeros((0, 2)), np.zeros(())
-    return Snapshot(state, jnp.array(buffers), Curves(rows, rows, rows, total, total, total), "")
+    return Snapshot(state, jax.device_put(buffers), Curves(rows, rows, rows, total, total, total), "")
 
 
 def blank_snapshot(config: RefineConfig) -> Snapshot:
     """A snapshot's structure and dtypes, with which to read one back."""
-    one, sh = jnp.ones(1), jnp.zeros((1, 1, 3))
-    scene = Gaussians(jnp.zeros((1, 3)), jnp.zeros((1, 3)), jnp.eye(1, 4), one, sh, one > 0)
+    one, three = np.ones(1, np.float32), np.zeros((1, 3), np.float32)
+    scene = Gaussians(three, three, np.eye(1, 4, dtype=np.float32), one, three[:, None], one > 0)
     state = initial_state(scene, config, extent=1.0)
-    return Snapshot(state, jnp.zeros(4, jnp.int32), Curves(*[np.zeros(0)] * 6), "")
+    return Snapshot(state, jax.device_put(np.zeros(4, np.int32)), Curves(*[np.zeros(0)] * 6), "")

@@ -1,5 +1,7 @@
 """Everything that a step changes, and its start."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import optax
@@ -42,10 +44,12 @@ class RefineState:
         return _one(join_parameters(parameters, self.alive), self.still.shown)
 
 
+@jax.jit
 def _one(*scenes: Gaussians) -> Gaussians:
     return jax.tree.map(lambda *x: jnp.concatenate(x), *scenes)
 
 
+@partial(jax.jit, static_argnums=1)
 def initial_state(
     gaussians: Gaussians, config: RefineConfig, *, extent: float, still: Still | None = None
 ) -> RefineState:

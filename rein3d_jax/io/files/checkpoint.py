@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from rein3d_jax.errors import InputError
@@ -37,7 +36,7 @@ def load(path: str | Path, like: Any) -> Any:
 def _as(leaf: Any, array: np.ndarray) -> Any:
     if isinstance(leaf, str):
         return str(array)
-    return array if isinstance(leaf, np.ndarray | np.generic | int | float | complex) else jnp.asarray(array)
+    return array if isinstance(leaf, np.ndarray | np.generic | int | float | complex) else jax.device_put(array)
 
 
 def _named_leaves(tree: Any) -> dict[str, Any]:

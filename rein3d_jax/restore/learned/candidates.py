@@ -34,12 +34,14 @@ def clip_of(video: Video, *, observed: float, background: Background | None) -> 
     return Clip(video.rgb, video.alpha, video.distance, rgb, distance, positions(video.world_from_camera))
 
 
+@jax.jit
 def positions(world_from_camera: jax.Array) -> jax.Array:
     """Positions (t, 3) of poses (t, 4, 4) in metres from the first, in its own axes: +X lies at its centre column."""
     moved = world_from_camera[:, :3, 3] - world_from_camera[0, :3, 3]
     return jnp.matmul(moved, world_from_panorama(world_from_camera[0]), precision=jax.lax.Precision.HIGHEST)
 
 
+@jax.jit
 def _candidates(rgb, distance, known, pose, anchor: Anchor | None):
     """Fills (h, w, CANDIDATES, 3) and their metres (h, w, CANDIDATES) of a frame."""
     far = fill_from_far_side(rgb, distance, known)
@@ -50,7 +52,6 @@ def _candidates(rgb, distance, known, pose, anchor: Anchor | None):
     return tuple(jnp.stack(part, axis=2) for part in zip(shell, far, openings, strict=True))
 
 
-@jax.jit
 def fill_openings(
     rgb: jax.Array,
     distance: jax.Array,

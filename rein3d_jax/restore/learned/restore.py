@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from rein3d_jax.restore.background import Background
 from rein3d_jax.restore.blend import blend_unmatched
 from rein3d_jax.restore.learned.candidates import clip_of
+from rein3d_jax.restore.learned.condition import Clip
 from rein3d_jax.restore.learned.sample import Learned, sample_clip
 from rein3d_jax.scene import Video
 
@@ -37,11 +38,16 @@ def restore_learned(
     network that was trained with noise.
     """
     clip = clip_of(video, observed=observed, background=background)
-    padded = jax.tree.map(partial(_padded, count=-len(clip.alpha) % _GROUP), clip)
-    drawn = sample_clip(key, learned, padded, steps)[: len(clip.alpha)]
-    guess = jnp.clip(_near_fills(drawn[..., :3], clip.fill_rgb), 0.0, 1.0)
-    rgb = blend_unmatched(guess, video.rgb, video.alpha, observed=observed)
+    count = len(clip.alpha)
+    rgb = _colours(key, learned, _padded(clip, -count % _GROUP), observed, steps)[:count]
     return video.replace(rgb=rgb, distance=clip.fill_distance[..., 0])
+
+
+@partial(jax.jit, static_argnums=(3, 4))
+def _colours(key: jax.Array, learned: Learned, clip: Clip, observed: float, steps: int) -> jax.Array:
+    drawn = sample_clip(key, learned, clip, steps)
+    guess = jnp.clip(_near_fills(drawn[..., :3], clip.fill_rgb), 0.0, 1.0)
+    return blend_unmatched(guess, clip.rgb, clip.alpha, observed=observed)
 
 
 def _near_fills(colours: jax.Array, fills: jax.Array) -> jax.Array:
@@ -50,6 +56,7 @@ def _near_fills(colours: jax.Array, fills: jax.Array) -> jax.Array:
     return jnp.clip(colours, jnp.min(fills, axis=-2) - reach, jnp.max(fills, axis=-2) + reach)
 
 
-def _padded(frames: jax.Array, count: int) -> jax.Array:
-    """(t, ...) -> (t + count, ...), the last frame again."""
-    return jnp.concatenate([frames, jnp.repeat(frames[-1:], count, axis=0)])
+@partial(jax.jit, static_argnums=1)
+def _padded(clip: Clip, count: int) -> Clip:
+    """The clip, its last frame shown `count` times more."""
+    return jax.tree.map(lambda x: jnp.concatenate([x, jnp.repeat(x[-1:], count, axis=0)]), clip)

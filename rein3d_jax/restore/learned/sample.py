@@ -1,6 +1,6 @@
 """The learned restorer's sampler: from noise to a clip in a few steps."""
 
-from itertools import pairwise
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -22,21 +22,24 @@ class Learned:
     config: NetworkConfig = struct.field(pytree_node=False)
 
 
+@partial(jax.jit, static_argnames="steps")
 def sample_clip(key: jax.Array, learned: Learned, clip: Clip, steps: int) -> jax.Array:
     """sRGB, not clipped, and the distance's logarithm, (t, h, w, 4), of a clip (t, h, w): down the straight path of
     loss.py from noise level 1 to 0. One step gives the mean of what may be there, whatever the key; more of them draw
     from it, if the network was trained with noise."""
     start = base(clip)
-    noisy = NOISE * draw_noise(key, start.shape)
     levels = jnp.linspace(1.0, 0.0, steps + 1)
-    for level, lower in pairwise(levels):
+
+    def down(noisy, between):
+        level, lower = between
         clean = _clean(learned, clip, noisy, level)
         noise = (noisy - (1 - level) * clean) / level
-        noisy = (1 - lower) * clean + lower * noise
-    return start + noisy
+        return (1 - lower) * clean + lower * noise, None
+
+    noisy = NOISE * draw_noise(key, start.shape)
+    return start + jax.lax.scan(down, noisy, (levels[:-1], levels[1:]))[0]
 
 
-@jax.jit
 def _clean(learned: Learned, clip: Clip, noisy: jax.Array, level: jax.Array) -> jax.Array:
     shown = jnp.where(level < 1, noisy, 0.0)  # at level 1 nothing of x_0 is left
     clips = jax.tree.map(lambda x: x[None], clip)

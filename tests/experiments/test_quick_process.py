@@ -1,10 +1,11 @@
 """The quicker way to compile is asked for, and never against the user."""
 
+import gc
 import os
 
 import pytest
 
-from experiments.quick_compilation import compile_quickly
+from experiments.quick_process import begin_quickly
 
 QUICK = "--xla_cpu_use_fusion_emitters=false"
 
@@ -22,5 +23,13 @@ def test_the_users_own_flags_stay_and_win(monkeypatch, before, after):
     if before is not None:
         monkeypatch.setenv("XLA_FLAGS", before)
     for _ in range(2):  # asked for twice is asked for once
-        compile_quickly()
+        begin_quickly()
         assert os.environ["XLA_FLAGS"] == after
+
+
+def test_what_was_imported_is_no_garbage_once_and_for_all():
+    begin_quickly()
+    frozen = gc.get_freeze_count()
+    assert frozen > 0 and gc.get_threshold()[0] > 700
+    begin_quickly()  # another command of the same process: what the first one made may be garbage by now
+    assert gc.get_freeze_count() <= frozen
