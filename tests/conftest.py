@@ -19,11 +19,14 @@ from experiments.compiled_programs import forget_when_many  # noqa: E402
 
 
 def pytest_collection_modifyitems(config, items):
-    """Measurements run where they are asked for (-m bench), not where another selection forgets to leave them out."""
+    """Measurements run where they are asked for (-m bench), not where another selection forgets to leave them out. Files
+    with whole jobs come first: workers take file after file, and a long one at the end would keep one of them alone."""
     if "bench" not in (config.option.markexpr or ""):
         chosen = [item for item in items if item.get_closest_marker("bench") is None]
         config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
         items[:] = chosen
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
 
 
 @pytest.fixture(autouse=True, scope="module")

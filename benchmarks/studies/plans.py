@@ -55,7 +55,8 @@ OTHERS = {"512 learned": ("input.height=512", "input.upsample=learned", "explore
 PEERS = {
     "lifted only": (*_DRAFT, *_NO_LAYERS, "restore.method=none", "refine.steps=0"),
     "a ball a pixel": (*_DRAFT, *_NO_LAYERS, *_ONE_A_PIXEL, "restore.method=none", "refine.steps=0", "lift.steepest=0",
-                       "lift.thickness=1", "lift.sharpen=0", "lift.footprint=0.85", "lift.plain_footprint=0.85"),
+                       "lift.thickness=1", "lift.sharpen=0", "lift.footprint=0.85", "lift.plain_footprint=0.85",
+                       "rasterize.filter=added", "rasterize.filter_variance=0.3", "rasterize.antialias=false"),
     "OpenCV's Telea": (*_DRAFT, "restore.method=telea"),
 }  # fmt: skip
 
