@@ -19,8 +19,9 @@ from experiments.compiled_programs import forget_when_many  # noqa: E402
 
 
 def pytest_collection_modifyitems(config, items):
-    """Measurements run where they are asked for (-m bench), not where another selection forgets to leave them out. Files
-    with whole jobs come first: workers take file after file, and a long one at the end would keep one of them alone."""
+    """Measurements run where they are asked for (-m bench), not where another selection forgets to leave them out.
+    Files with whole jobs come first: workers take file after file, and a long one at the end keeps one of them alone.
+    """
     if "bench" not in (config.option.markexpr or ""):
         chosen = [item for item in items if item.get_closest_marker("bench") is None]
         config.hook.pytest_deselected(items=[item for item in items if item not in chosen])

@@ -34,10 +34,11 @@ def scenes(room: EvaluationRoom, config: ReconstructConfig) -> Iterator[tuple[st
     known, background = survey(panorama, config), room_background(panorama, config.restore)
     yield "lifted", known.coarse, 0.0
     cases = {
-        "+ room, by the shell's colours": ("background", PeelConfig(room=True, outside=False)),
-        "+ room, learned": ("learned", PeelConfig(room=True, outside=False)),
-        "+ outside": ("learned", PeelConfig(room=False, outside=True)),
-        "+ room, learned, + outside": ("learned", PeelConfig()),
+        "+ room, by the shell's colours": ("background", PeelConfig(room=True, outside=False, lining=False)),
+        "+ room, learned": ("learned", PeelConfig(room=True, outside=False, lining=False)),
+        "+ outside": ("learned", PeelConfig(room=False, outside=True, lining=False)),
+        "+ room, learned, + outside": ("learned", PeelConfig(lining=False)),
+        "+ room, learned, + outside, + lining": ("learned", PeelConfig()),
     }
     for name, (method, layers) in cases.items():
         stages = replace(config, peel=layers, restore=replace(config.restore, method=method))

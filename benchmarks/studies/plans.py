@@ -48,7 +48,7 @@ BUDGETS = (10, 20, 40, 80, 160)  # of the processor's seconds
 RECIPES = ("draft", "quick")
 _COMPILED = 3.0  # seconds in which a job's programs are at most read, not compiled
 _DRAFT = ("input.height=256", "input.upsample=none", "explore.trajectories=3")
-_NO_LAYERS = ("peel.room=false", "peel.outside=false")
+_NO_LAYERS = ("peel.room=false", "peel.outside=false", "peel.lining=false")
 _ONE_A_PIXEL = ("lift.share=1", "lift.worth=0")
 
 OTHERS = {"512 learned": ("input.height=512", "input.upsample=learned", "explore.trajectories=1", "refine.steps=0")}

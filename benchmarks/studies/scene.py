@@ -40,7 +40,7 @@ RECIPE = "quick"
 SIZE = ("input.height=128", "restore.height=128", "lift.share=1.0", "refine.views.size=64", "refine.steps=200",
         "refine.evaluate_every=200")  # fmt: skip
 WHOLE = ("input.height=256", "restore.height=256", "lift.share=0.99", "lift.worth=0", "input.upsample=none")
-NO_LAYERS = ("peel.room=false", "peel.outside=false")
+NO_LAYERS = ("peel.room=false", "peel.outside=false", "peel.lining=false")
 EVERY_PATH = ("explore.min_revealed=0",)
 GROWING = ("refine.densification=default", "refine.densify.start=25", "refine.densify.every=25",
            "refine.densify.stop=151", "refine.spare=0.2")  # fmt: skip

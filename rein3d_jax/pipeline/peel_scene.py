@@ -1,10 +1,11 @@
-"""The coarse scene with the layers behind it: the room behind what stands in it, the outside behind the room."""
+"""The coarse scene with the layers behind it: the room behind what stands in it, the outside behind the room, and a
+lining right behind sharp surfaces."""
 
 import dataclasses
 
 import jax
 
-from rein3d_jax.lift import lift, lift_adaptively
+from rein3d_jax.lift import lift, lift_adaptively, lining
 from rein3d_jax.peel import behind_things, outside_of, without_things
 from rein3d_jax.pipeline.buffer import joined_in
 from rein3d_jax.pipeline.stages import Stages, origin_pose
@@ -39,4 +40,7 @@ def peel_scene(
         if outside.there:
             new = lift(outside.panorama, origin_pose(), outside.shown, config=config)
             scene, _ = joined_in(scene, new, grow=True)
+    if stages.peel.lining:
+        new = lining(known.panorama, origin_pose(), config=config)
+        scene, _ = joined_in(scene, new, grow=True)
     return scene

@@ -1,5 +1,6 @@
 """paper.toml is the paper, and paper_small.toml the same in the small: every stage of it runs, weights and all."""
 
+import dataclasses
 import json
 import tomllib
 from pathlib import Path
@@ -56,7 +57,7 @@ def test_the_papers_numbers():
     assert densify.prune_opacity == 0.005
     assert (rates.means, rates.scales, rates.opacities, rates.quats) == (1.6e-4, 5e-3, 5e-2, 1e-3)
     assert (rates.sh, rates.sh_rest) == (2.5e-3, 1.25e-4)
-    assert not (config.peel.room or config.peel.outside) and config.upsample.method == "learned"
+    assert not any(dataclasses.astuple(config.peel)) and config.upsample.method == "learned"
 
 
 def test_without_weights_it_is_refused_in_one_line_before_anything_is_written(tmp_path, monkeypatch, capsys):

@@ -58,7 +58,7 @@ def test_behind_the_board_there_is_the_wall(known):
 
 
 def test_layers_that_are_not_wanted_are_not_made(known):
-    scene = peeled(known, peel=r3d.peel.PeelConfig(room=False, outside=False))
+    scene = peeled(known, peel=r3d.peel.PeelConfig(room=False, outside=False, lining=False))
     assert all(np.array_equal(a, b) for a, b in zip(jax.tree.leaves(scene), jax.tree.leaves(known.coarse), strict=True))
 
 
@@ -71,5 +71,6 @@ def test_an_empty_room_asks_for_no_guess(known):
     rays = pixel_rays(ROWS, 2 * ROWS)
     empty = known.panorama.replace(distance=jnp.min(HALF / jnp.maximum(jnp.abs(rays), 1e-6), axis=-1))
     background = room_background(empty, STAGES.restore)
-    scene = peel_scene(known.replace(panorama=empty), background, lambda *_: 1 / 0, KEY, stages=STAGES)
+    stages = dataclasses.replace(STAGES, peel=r3d.peel.PeelConfig(lining=False))
+    scene = peel_scene(known.replace(panorama=empty), background, lambda *_: 1 / 0, KEY, stages=stages)
     assert int(scene.alive.sum()) == int(known.coarse.alive.sum())

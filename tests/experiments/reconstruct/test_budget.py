@@ -103,7 +103,7 @@ def test_a_run_keeps_to_its_bytes_and_says_so(recipe, tmp_path):
 
 
 def test_paths_that_reveal_too_little_are_left_out(recipe, tmp_path):
-    unpeeled = ("peel.room=false", "peel.outside=false")
+    unpeeled = ("peel.room=false", "peel.outside=false", "peel.lining=false")
     metrics = run(recipe, tmp_path / "run", "explore.min_revealed=0.99", "refine.densification=none", *unpeeled)
     assert metrics["paths"] and not any(path["restored"] for path in metrics["paths"])
     assert metrics["count"]["refined"] == metrics["count"]["lift"]
