@@ -29,6 +29,7 @@ from benchmarks.stability.page import draw_page, require_drawing
 from benchmarks.stability.regime import Regime
 from experiments.command import CommandParser
 from experiments.compiled_programs import forget_when_many
+from experiments.quick_process import begin_quickly
 from rein3d_jax.errors import InputError
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.files.json_file import read_json
@@ -39,6 +40,7 @@ REGIMES: dict[str, Regime] = {regime.name: regime for part in PARTS for regime i
 
 def main(arguments: list[str] | None = None) -> int:
     """Prints the table. Exit code 0, or 2 where a regime is unknown."""
+    begin_quickly()
     parser = CommandParser("stability", __doc__, "benchmarks")
     parser.add_argument("--regimes", metavar="A,B", help='some of them; "none" only draws what FILE holds')
     parser.add_argument("--quick", action="store_true", help="one seed, at the mild end and the outermost severities")

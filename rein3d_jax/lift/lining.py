@@ -24,12 +24,12 @@ from rein3d_jax.lift.lift import lift
 from rein3d_jax.lift.surface import beside_steps, slopes
 from rein3d_jax.scene import Gaussians, Panorama
 
-_OPEN = 1.1  # overlap below which four splats leave more than a hundredth between them
+_OPEN = 1.0  # overlap below which four splats leave more than a fortieth between them
 _OVERLAP = 1.0  # the lining's own: its blur shows through an eighth at most
 _BEHIND = 2.0  # pixels of depth, where the surface faces the camera
 _STEEPEST = 1.0  # tangent of incidence up to which a surface is lined
 _FROM_STEPS = 3  # pixels
-_AROUND = 2  # pixels around open ones: larger splats are narrow where a neighbour is
+_AROUND = 1  # pixel around open ones: larger splats are narrow where a neighbour is
 
 
 def lining(panorama: Panorama, world_from_camera: jax.Array, *, config: LiftConfig) -> Gaussians:
