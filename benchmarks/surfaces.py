@@ -2,10 +2,10 @@
 
     python -m benchmarks.surfaces [--photo FILE [--distance FILE]] [--height 512] [--json FILE]
 
-A box room of one colour, lifted with its exact distance at shares 1, 0.5 and 0.25, is seen from 0.8 to 1.7 m off the
-centre: mean and 1st percentile of alpha, and the ripple, 99th percentile of a picture less its 15 x 15 mean, in grey
-levels of 255. A photo, lifted at its own size (its distance estimated where none is given), is seen from where it was
-taken, over black: PSNR, the same weighed by area, and the share of its gradients' energy that is left.
+A box room of one colour, lifted and lined with its exact distance at shares 1, 0.5 and 0.25, is seen from 0.8 to 1.7 m
+off the centre: mean and 1st percentile of alpha, and the ripple, 99th percentile of a picture less its 15 x 15 mean, in
+grey levels of 255. A photo, lifted at its own size (its distance estimated where none is given), is seen from where it
+was taken, over black: PSNR, the same weighed by area, and the share of its gradients' energy that is left.
 """
 
 import argparse
@@ -24,8 +24,9 @@ from rein3d_jax.geometry.poses import equirectangular_camera
 from rein3d_jax.geometry.sphere import pixel_rays
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.io.pictures.panorama import read_panorama
-from rein3d_jax.lift import LiftConfig, lift_adaptively
+from rein3d_jax.lift import LiftConfig, lift_adaptively, lining
 from rein3d_jax.networks.depth import read_depth_network
+from rein3d_jax.pipeline.buffer import joined_in
 from rein3d_jax.pipeline.stages import Stages, level_pose, origin_pose
 from rein3d_jax.pipeline.survey import with_distance
 from rein3d_jax.rasterize import render
@@ -72,8 +73,10 @@ def one_colour_room() -> Panorama:
 
 
 def _lifted(panorama: Panorama, share: float) -> Gaussians:
-    every = jnp.ones(panorama.distance.shape, bool)
-    return lift_adaptively(panorama.replace(valid=every), origin_pose(), every, config=LiftConfig(share=share))
+    """The surfaces and their lining."""
+    every, config = jnp.ones(panorama.distance.shape, bool), LiftConfig(share=share)
+    surfaces = lift_adaptively(panorama.replace(valid=every), origin_pose(), every, config=config)
+    return joined_in(surfaces, lining(panorama, origin_pose(), config=config), grow=True)[0]
 
 
 def _solidity(scene: Gaussians) -> dict[str, float]:
