@@ -18,6 +18,11 @@ os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
 from experiments.compiled_programs import forget_when_many  # noqa: E402
 
 
+def pytest_configure(config):
+    """The order of files is the one below: xdist's own begins with those of many tests, which are the short ones."""
+    config.option.loadscopereorder = False
+
+
 def pytest_collection_modifyitems(config, items):
     """Measurements run where they are asked for (-m bench), not where another selection forgets to leave them out.
     Files with whole jobs come first: workers take file after file, and a long one at the end keeps one of them alone.

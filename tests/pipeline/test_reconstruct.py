@@ -11,6 +11,7 @@ import rein3d_jax as r3d
 from rein3d_jax.depth.estimate import DepthConfig
 from rein3d_jax.depth.room_shell import RoomShellConfig
 from rein3d_jax.geometry.sphere import pixel_rays
+from rein3d_jax.pipeline.peel_scene import peel_scene
 from rein3d_jax.pipeline.survey import room_background
 from rein3d_jax.restore import restorer
 
@@ -45,9 +46,11 @@ def result(panorama) -> r3d.Reconstruction:
 def explore(panorama):
     """(start=state) -> the states after each path from there: the generators, as a caller who watches them would."""
     known = r3d.survey(panorama, STAGES)
-    fill = restorer(STAGES.restore, room_background(panorama, STAGES.restore), None)
-    key = jax.random.fold_in(KEY, 0)
-    return lambda **start: list(r3d.explore_and_restore(known, fill, key, stages=STAGES, **start))
+    background = room_background(panorama, STAGES.restore)
+    fill = restorer(STAGES.restore, background, None)
+    key, peel_key = (jax.random.fold_in(KEY, i) for i in (0, 2))
+    peeled = known.replace(coarse=peel_scene(known, background, fill, peel_key, stages=STAGES))
+    return lambda **start: list(r3d.explore_and_restore(peeled, fill, key, stages=STAGES, **start))
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +123,8 @@ def test_a_network_s_estimate_is_metres_by_the_camera_s_height(panorama) -> None
 
 def test_where_no_path_was_restored_nothing_is_refined(panorama):
     explore = dataclasses.replace(STAGES.explore, min_revealed=0.99)
-    result = r3d.reconstruct(panorama, KEY, stages=dataclasses.replace(STAGES, explore=explore))
+    stages = dataclasses.replace(STAGES, explore=explore, peel=r3d.peel.PeelConfig(lining=False))
+    result = r3d.reconstruct(panorama, KEY, stages=stages)
     assert all(len(video.rgb) == 1 for video in result.videos)
     assert len(result.curves.loss) == len(result.curves.psnr) == 0
     assert int(result.scene.alive.sum()) == int(result.coarse.alive.sum())  # an empty room: nothing is hidden
