@@ -83,3 +83,15 @@ def test_a_yaw_by_whole_pixels_yaws_it(lined):
     rolled = lining(jax.tree.map(lambda x: jnp.roll(x, 2, axis=1), room), origin_pose(), config=CONFIG)
     one = np.roll(np.asarray(lined.alive).reshape(ROWS // 2, ROWS), 1, axis=1)
     np.testing.assert_array_equal(np.asarray(rolled.alive).reshape(ROWS // 2, ROWS), one)
+
+
+def test_it_exports_for_accelerators():
+    """As one program, which gives the same as its two do here."""
+    room = cube()
+    exported = jax.export.export(
+        jax.jit(lambda room: lining(room, origin_pose(), config=CONFIG)), platforms=["cpu", "cuda", "tpu"]
+    )(room)
+    for one, two in zip(
+        jax.tree.leaves(exported.call(room)), jax.tree.leaves(lining(room, origin_pose(), config=CONFIG)), strict=True
+    ):
+        np.testing.assert_allclose(one, two, atol=1e-5)  # float32 rounding in another order
