@@ -33,11 +33,12 @@ def scenes(room: EvaluationRoom, config: ReconstructConfig) -> Iterator[tuple[st
     panorama = room.panorama
     known, background = survey(panorama, config), room_background(panorama, config.restore)
     yield "lifted", known.coarse, 0.0
+    none = PeelConfig(room=False, outside=False, lining=False)
     cases = {
-        "+ room, by the shell's colours": ("background", PeelConfig(room=True, outside=False, lining=False)),
-        "+ room, learned": ("learned", PeelConfig(room=True, outside=False, lining=False)),
-        "+ outside": ("learned", PeelConfig(room=False, outside=True, lining=False)),
-        "+ room, learned, + outside": ("learned", PeelConfig(lining=False)),
+        "+ room, by the shell's colours": ("background", replace(none, room=True)),
+        "+ room, learned": ("learned", replace(none, room=True)),
+        "+ outside": ("learned", replace(none, outside=True)),
+        "+ room, learned, + outside": ("learned", replace(none, room=True, outside=True)),
         "+ room, learned, + outside, + lining": ("learned", PeelConfig()),
     }
     for name, (method, layers) in cases.items():

@@ -22,6 +22,7 @@ from pathlib import Path
 import jax
 
 from benchmarks.studies.room_table import StudiedRoom
+from benchmarks.studies.scene import NO_LAYERS
 from experiments.command import CommandParser
 from experiments.compiled_programs import forget_when_many
 from experiments.config import load_config, toml_value
@@ -48,13 +49,12 @@ BUDGETS = (10, 20, 40, 80, 160)  # of the processor's seconds
 RECIPES = ("draft", "quick")
 _COMPILED = 3.0  # seconds in which a job's programs are at most read, not compiled
 _DRAFT = ("input.height=256", "input.upsample=none", "explore.trajectories=3")
-_NO_LAYERS = ("peel.room=false", "peel.outside=false", "peel.lining=false")
 _ONE_A_PIXEL = ("lift.share=1", "lift.worth=0")
 
 OTHERS = {"512 learned": ("input.height=512", "input.upsample=learned", "explore.trajectories=1", "refine.steps=0")}
 PEERS = {
-    "lifted only": (*_DRAFT, *_NO_LAYERS, "restore.method=none", "refine.steps=0"),
-    "a ball a pixel": (*_DRAFT, *_NO_LAYERS, *_ONE_A_PIXEL, "restore.method=none", "refine.steps=0", "lift.steepest=0",
+    "lifted only": (*_DRAFT, *NO_LAYERS, "restore.method=none", "refine.steps=0"),
+    "a ball a pixel": (*_DRAFT, *NO_LAYERS, *_ONE_A_PIXEL, "restore.method=none", "refine.steps=0", "lift.steepest=0",
                        "lift.thickness=1", "lift.sharpen=0", "lift.footprint=0.85", "lift.plain_footprint=0.85",
                        "rasterize.filter=added", "rasterize.filter_variance=0.3", "rasterize.antialias=false"),
     "OpenCV's Telea": (*_DRAFT, "restore.method=telea"),

@@ -6,6 +6,7 @@ Every row is quick.toml at half its size with some keys changed. Stages that two
 those of a row's stages, the median over rooms: the first ones compile.
 """
 
+import dataclasses
 import hashlib
 import itertools
 import json
@@ -29,6 +30,7 @@ from rein3d_jax.evaluate.metrics import psnr
 from rein3d_jax.explore.trajectories import radial_trajectories
 from rein3d_jax.io.files.atomic import write_text
 from rein3d_jax.networks.trained import read_network
+from rein3d_jax.peel import PeelConfig
 from rein3d_jax.pipeline.explore_and_restore import Explored, explore_and_restore
 from rein3d_jax.pipeline.peel_scene import peel_scene
 from rein3d_jax.pipeline.refine_scene import collect_views, refine_scene, where_it_pays
@@ -40,7 +42,7 @@ RECIPE = "quick"
 SIZE = ("input.height=128", "restore.height=128", "lift.share=1.0", "refine.views.size=64", "refine.steps=200",
         "refine.evaluate_every=200")  # fmt: skip
 WHOLE = ("input.height=256", "restore.height=256", "lift.share=0.99", "lift.worth=0", "input.upsample=none")
-NO_LAYERS = ("peel.room=false", "peel.outside=false", "peel.lining=false")
+NO_LAYERS = tuple(f"peel.{layer.name}=false" for layer in dataclasses.fields(PeelConfig))
 EVERY_PATH = ("explore.min_revealed=0",)
 GROWING = ("refine.densification=default", "refine.densify.start=25", "refine.densify.every=25",
            "refine.densify.stop=151", "refine.spare=0.2")  # fmt: skip

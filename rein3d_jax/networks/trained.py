@@ -72,7 +72,7 @@ def _learned(config: RestoreConfig) -> Learned:
         network = NetworkConfig(**sizes)
     except TypeError as error:
         raise InputError(f"{path} names sizes that this network does not have: train it again") from error
-    if path != SHIPPED_RESTORER and _wanted(network) != _shapes(parameters):  # of its own, tests tell
+    if path != SHIPPED_RESTORER and _wanted(network) != _shapes(parameters):  # of the packaged one, a test tells
         raise InputError(f"{path} does not hold the arrays of its own network's sizes: train it again")
     times, rest = divmod(config.height, network.rows)
     if rest or times & (times - 1):
